@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""CDRF: curvature-dependent translucency for EEVEE (Kubo, Dobashi and Morishima 2011).
+
+`cdrf_addon.core` is usable without Blender, so nothing here imports bpy before it registers.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+
+def _modules() -> tuple[ModuleType, ...]:
+    from . import ops, panels, props
+
+    return props, ops, panels
+
+
+def register() -> None:
+    """Register every class, property and handler of the extension."""
+    for module in _modules():
+        module.register()
+
+
+def unregister() -> None:
+    """Undo `register` in the reverse order."""
+    for module in reversed(_modules()):
+        module.unregister()

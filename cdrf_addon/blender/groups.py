@@ -1,0 +1,316 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The static node groups: look-up, one group per type of light, curvature display.
+
+None of them holds a driver or knows a scene; the scene's own group (shader.py) is made of them.
+Each light group turns what Blender says of a lamp into
+
+    Direction  unit vector from the surface to the light
+    Radiance   what a white Lambert surface facing the light would send out, per channel
+    Variance   blur of the terminator by the light's size, rad^2 (core/finite_light.py)
+
+EEVEE's own constants and limits are kept (docs/decisions/003-radiometry.md).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+
+from .. import ids
+from ..core.finite_light import VARIANCE_COEFFICIENTS
+from ..core.lut import DEFAULT_LAYOUT, VARIANCE_MAX
+from .image import ensure_lut_image
+from .nodetree import TreeBuilder, declare, ensure_group
+
+VERSION = 1
+
+ELLIPTIC = {"DISK", "ELLIPSE"}
+
+CHANNEL_SETS = ("RGB", "R GB", "RG B", "RB G", "R G B")
+"""Which channels share a sigma0, and so a look-up."""
+
+SOFT_RADIUS2 = 1e-6  # EEVEE treats a point light as a sphere of at least 1 mm
+
+
+def _ends(b: TreeBuilder) -> tuple[Any, Any]:
+    return b.node("NodeGroupInput").outputs, b.node("NodeGroupOutput").inputs
+
+
+def reflectance_group(channels: str) -> bpy.types.ShaderNodeTree:
+    """f(theta, sigma) per channel, one texture look-up per part of `channels` ("RG B": two).
+
+    Wiring, with K, offset and scale from core/lut.py:
+
+        Cosine -> q = sign(c) sqrt|c| -> p = pi K q -> (sin p, cos p) --+
+        Variance -> min(., max) -> ^1/4 -> v = offset + scale w --------+-> tube look-up -> f
+    """
+
+    def build(b: TreeBuilder) -> None:
+        declare(b.tree, ids.COSINE, default=1.0, tip="Cosine between normal and light")
+        declare(b.tree, ids.VARIANCE, "Vector", tip="Squared blur width of each channel")
+        declare(b.tree, ids.REFLECTANCE, "Vector", output=True)
+        given, result = _ends(b)
+        layout = DEFAULT_LAYOUT
+        cosine = given[ids.COSINE]
+        root = b.math("SQRT", b.math("ABSOLUTE", cosine))
+        q = b.math("MULTIPLY", root, b.math("SIGN", cosine))
+        p = b.math("MULTIPLY", q, math.pi * layout.seam_factor)
+        # Blender maps the tube's (0..1) cube to (-1..1) itself.
+        across = b.math("MULTIPLY_ADD", b.math("SINE", p), 0.5, 0.5)
+        along = b.math("MULTIPLY_ADD", b.math("COSINE", p), 0.5, 0.5)
+        variance = dict(zip("RGB", b.separate(given[ids.VARIANCE]), strict=True))
+        image = ensure_lut_image()
+        f = {}
+        for shared in channels.split():
+            # The limit first: MINIMUM(limit, NaN) is the limit, so a bad attribute stays finite.
+            w = b.math("MINIMUM", VARIANCE_MAX, variance[shared[0]])
+            w = b.math("SQRT", b.math("SQRT", b.math("MAXIMUM", 0.0, w)))
+            v = b.math("MULTIPLY_ADD", w, layout.row_scale / VARIANCE_MAX**0.25, layout.row_offset)
+            texture = b.node(
+                "ShaderNodeTexImage",
+                f"Look-up {shared}",
+                image=image,
+                projection="TUBE",
+                interpolation="Linear",
+                extension="EXTEND",
+            )
+            b.feed(texture.inputs["Vector"], b.combine(across, along, v))
+            value = b.node("ShaderNodeSeparateColor")
+            b.feed(value.inputs["Color"], texture.outputs["Color"])
+            for channel in shared:
+                f[channel] = value.outputs["Red"]
+        b.feed(result[ids.REFLECTANCE], b.combine(f["R"], f["G"], f["B"]))
+
+    parts = "+".join(channels.split())
+    role = f"{ids.ROLE_REFLECTANCE} {channels}"
+    return ensure_group(f"CDRF Reflectance {parts}", role, VERSION, build)
+
+
+def _declare_light(tree: bpy.types.ShaderNodeTree) -> None:
+    declare(tree, ids.POWER, "Vector", tip="Light's power times Blender's constant for its type")
+    for name in (ids.DIRECTION, ids.RADIANCE):
+        declare(tree, name, "Vector", output=True)
+    declare(tree, ids.VARIANCE, output=True)
+
+
+def _declare_local(tree: bpy.types.ShaderNodeTree) -> None:
+    declare(tree, ids.POSITION, "Vector", tip="Position of the light")
+    declare(
+        tree, ids.INVERSE_RANGE2, low=0.0, tip="1 / squared distance at which EEVEE cuts it off"
+    )
+
+
+def _finite(b: TreeBuilder, sin2: Any) -> tuple[Any, Any]:
+    """Return variance and gain of a light of that squared sine (core/finite_light.py)."""
+    c0, c1, c2 = VARIANCE_COEFFICIENTS
+    inner = b.math("MULTIPLY_ADD", sin2, c2, c1)
+    inner = b.math("MULTIPLY_ADD", sin2, inner, c0)
+    variance = b.math("MULTIPLY", sin2, inner)
+    return variance, b.math("EXPONENT", b.math("MULTIPLY", variance, 0.5))
+
+
+def _towards(b: TreeBuilder, position: Any) -> tuple[Any, Any]:
+    """Vector from the shaded point to the light, and its squared length."""
+    point = b.node("ShaderNodeNewGeometry").outputs["Position"]
+    to_light = b.vector("SUBTRACT", position, point)
+    return to_light, b.vector("DOT_PRODUCT", to_light, to_light)
+
+
+def _window(b: TreeBuilder, distance2: Any, inverse_range2: Any) -> Any:
+    """EEVEE's fade to zero at the light's range: clamp(1 - (d / R)^4)^2."""
+    ratio2 = b.math("MULTIPLY", distance2, inverse_range2)
+    fade = b.math("SUBTRACT", 1.0, b.math("MULTIPLY", ratio2, ratio2), clamp=True)
+    return b.math("MULTIPLY", fade, fade)
+
+
+def sun_group() -> bpy.types.ShaderNodeTree:
+    """Sun: parallel light from Axis Z, blurred by its angle."""
+
+    def build(b: TreeBuilder) -> None:
+        _declare_light(b.tree)
+        declare(b.tree, ids.AXIS_Z, "Vector", tip="Towards the sun, any length")
+        declare(b.tree, ids.SIN2_HALF_ANGLE, low=0.0, high=1.0)
+        given, result = _ends(b)
+        variance, gain = _finite(b, given[ids.SIN2_HALF_ANGLE])
+        b.feed(result[ids.DIRECTION], b.vector("NORMALIZE", given[ids.AXIS_Z]))
+        b.feed(result[ids.RADIANCE], b.vector("SCALE", given[ids.POWER], scale=gain))
+        b.feed(result[ids.VARIANCE], variance)
+
+    return ensure_group("CDRF Sun", "light SUN", VERSION, build)
+
+
+def point_group() -> bpy.types.ShaderNodeTree:
+    """Point: 1 / (d^2 + soft r^2), never nearer than its own radius, cut off at its range."""
+
+    def build(b: TreeBuilder) -> None:
+        _declare_light(b.tree)
+        _declare_local(b.tree)
+        declare(b.tree, ids.RADIUS, low=0.0)
+        declare(b.tree, ids.SOFT_FALLOFF, low=0.0, high=1.0)
+        given, result = _ends(b)
+        to_light, distance2 = _towards(b, given[ids.POSITION])
+        radius2 = b.math("MULTIPLY", given[ids.RADIUS], given[ids.RADIUS])
+        softened = b.math("MULTIPLY_ADD", radius2, given[ids.SOFT_FALLOFF], distance2)
+        floor = b.math("MAXIMUM", SOFT_RADIUS2, radius2)
+        falloff = b.math("DIVIDE", 1.0, b.math("MAXIMUM", softened, floor))
+        variance, gain = _finite(b, b.math("MULTIPLY", radius2, falloff))
+        amount = b.math("MULTIPLY", falloff, gain)
+        amount = b.math("MULTIPLY", amount, _window(b, distance2, given[ids.INVERSE_RANGE2]))
+        b.feed(result[ids.DIRECTION], b.vector("NORMALIZE", to_light))
+        b.feed(result[ids.RADIANCE], b.vector("SCALE", given[ids.POWER], scale=amount))
+        b.feed(result[ids.VARIANCE], variance)
+
+    return ensure_group("CDRF Point", "light POINT", VERSION, build)
+
+
+def spot_group() -> bpy.types.ShaderNodeTree:
+    """Spot: a point light behind EEVEE's mask, elliptical where the lamp is scaled.
+
+    With x, y, z the direction in the lamp's frame, its axes scaled as the lamp is:
+        mask = smoothstep((1 / sqrt(1 + (x/z)^2 + (y/z)^2) - cone cosine) * sharpness),  z > 0
+    """
+
+    def build(b: TreeBuilder) -> None:
+        _declare_light(b.tree)
+        _declare_local(b.tree)
+        declare(b.tree, ids.RADIUS, low=0.0)
+        declare(b.tree, ids.SOFT_FALLOFF, low=0.0, high=1.0)
+        for axis in (ids.AXIS_X, ids.AXIS_Y, ids.AXIS_Z):
+            declare(b.tree, axis, "Vector", tip="Axis of the lamp, as long as the lamp is scaled")
+        declare(b.tree, ids.CONE_COSINE, low=-1.0, high=1.0)
+        declare(b.tree, ids.CONE_SHARPNESS, low=0.0)
+        given, result = _ends(b)
+        point = b.group(
+            point_group(),
+            "Point",
+            Power=given[ids.POWER],
+            Position=given[ids.POSITION],
+            Inverse_Squared_Range=given[ids.INVERSE_RANGE2],
+            Radius=given[ids.RADIUS],
+            Soft_Falloff=given[ids.SOFT_FALLOFF],
+        ).outputs
+        direction = point[ids.DIRECTION]
+
+        def along(axis: Any) -> Any:
+            # Component over length: dot(L, A) / |A|^2; Blender's division by zero is zero.
+            length2 = b.vector("DOT_PRODUCT", axis, axis)
+            return b.math("DIVIDE", b.vector("DOT_PRODUCT", direction, axis), length2)
+
+        x, y, z = (along(given[axis]) for axis in (ids.AXIS_X, ids.AXIS_Y, ids.AXIS_Z))
+        across = b.combine(b.math("DIVIDE", x, z), b.math("DIVIDE", y, z), 0.0)
+        cosine = b.math("INVERSE_SQRT", b.math("ADD", 1.0, b.vector("DOT_PRODUCT", across, across)))
+        inside = b.math("SUBTRACT", cosine, given[ids.CONE_COSINE])
+        t = b.math("MULTIPLY", inside, given[ids.CONE_SHARPNESS], clamp=True)
+        smooth = b.math("MULTIPLY", b.math("MULTIPLY", t, t), b.math("MULTIPLY_ADD", t, -2.0, 3.0))
+        mask = b.math("MULTIPLY", smooth, b.math("GREATER_THAN", z, 0.0))
+        b.feed(result[ids.DIRECTION], direction)
+        b.feed(result[ids.RADIANCE], b.vector("SCALE", point[ids.RADIANCE], scale=mask))
+        b.feed(result[ids.VARIANCE], point[ids.VARIANCE])
+
+    return ensure_group("CDRF Spot", "light SPOT", VERSION, build)
+
+
+# Corners of an area light in units of its half-axes. An ellipse is the octagon of its area; the
+# octagon's second moments are within 0.3 % of the ellipse's.
+RECTANGLE = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
+_OCTAGON_RADIUS = math.sqrt(math.pi / (2.0 * math.sqrt(2.0)))
+ELLIPSE = tuple(
+    (
+        _OCTAGON_RADIUS * math.cos(math.pi * (2 * i + 1) / 8),
+        _OCTAGON_RADIUS * math.sin(math.pi * (2 * i + 1) / 8),
+    )
+    for i in range(8)
+)
+# EEVEE does not render an area light whose half-axes multiply to less than this (square metres).
+LEAST_HALF_AXES_PRODUCT = 1e-5
+
+
+def area_group(*, elliptic: bool) -> bpy.types.ShaderNodeTree:
+    """Area: vector irradiance of a polygon (Lambert 1760), exact at any distance.
+
+    F = 1/2 sum over the edges of angle x unit normal of the edge's plane, V0 x V1 / |V0 x V1|; the
+    angle is atan2(|V0 x V1|, V0 . V1), which does not cancel for a small or far light. |F| / pi is
+    the form factor, F / |F| the direction from which the light comes.
+    """
+    shape, axes_to_area = (ELLIPSE, math.pi) if elliptic else (RECTANGLE, 4.0)
+
+    def build(b: TreeBuilder) -> None:
+        _declare_light(b.tree)
+        _declare_local(b.tree)
+        for axis in (ids.AXIS_X, ids.AXIS_Y, ids.AXIS_Z):
+            declare(b.tree, axis, "Vector", tip="Axis of the lamp, as long as the lamp is scaled")
+        declare(b.tree, ids.HALF_X, low=0.0, tip="Half of the shape's size along X")
+        declare(b.tree, ids.HALF_Y, low=0.0, tip="Half of the shape's size along Y")
+        declare(b.tree, ids.NORMALIZE, default=1.0, low=0.0, high=1.0)
+        given, result = _ends(b)
+        centre, distance2 = _towards(b, given[ids.POSITION])
+        right = b.vector("SCALE", given[ids.AXIS_X], scale=given[ids.HALF_X])
+        up = b.vector("SCALE", given[ids.AXIS_Y], scale=given[ids.HALF_Y])
+        corners = []
+        for x, y in shape:
+            side = b.vector("MULTIPLY_ADD", right, (x,) * 3, centre)
+            corners.append(b.vector("MULTIPLY_ADD", up, (y,) * 3, side))
+        doubled: Any = (0.0, 0.0, 0.0)
+        for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
+            normal = b.vector("CROSS_PRODUCT", start, end)
+            length = b.vector("LENGTH", normal)
+            angle = b.math("ARCTAN2", length, b.vector("DOT_PRODUCT", start, end))
+            weight = b.math("DIVIDE", angle, length)
+            doubled = b.vector("ADD", doubled, b.vector("SCALE", normal, scale=weight))
+        # The corners run against the clock as seen from behind the lamp, so F points at the light
+        # from its lit side; a mirrored lamp would turn it, hence the sign of its own Z axis.
+        ahead = b.vector("DOT_PRODUCT", centre, given[ids.AXIS_Z])
+        lit = b.math("GREATER_THAN", ahead, 0.0)
+        turn = b.math("SIGN", b.vector("DOT_PRODUCT", doubled, centre))
+        irradiance = b.vector("SCALE", doubled, scale=b.math("MULTIPLY", turn, 0.5))
+        magnitude = b.vector("LENGTH", irradiance)
+        product = b.vector("LENGTH", b.vector("CROSS_PRODUCT", right, up))
+        drawn = b.math("GREATER_THAN", product, LEAST_HALF_AXES_PRODUCT)
+        world_area = b.math("MULTIPLY", product, axes_to_area)
+        variance, gain = _finite(b, b.math("MULTIPLY", magnitude, 1.0 / math.pi))
+        # Per square metre without Normalize, in all with it: area^-normalize.
+        density = b.math("POWER", world_area, b.math("MULTIPLY", given[ids.NORMALIZE], -1.0))
+        amount = b.math("MULTIPLY", b.math("MULTIPLY", magnitude, density), gain)
+        amount = b.math("MULTIPLY", amount, b.math("MULTIPLY", lit, drawn))
+        amount = b.math("MULTIPLY", amount, _window(b, distance2, given[ids.INVERSE_RANGE2]))
+        b.feed(result[ids.DIRECTION], b.vector("NORMALIZE", irradiance))
+        b.feed(result[ids.RADIANCE], b.vector("SCALE", given[ids.POWER], scale=amount))
+        b.feed(result[ids.VARIANCE], variance)
+
+    shape_name = "Ellipse" if elliptic else "Rectangle"
+    return ensure_group(f"CDRF Area {shape_name}", f"light AREA {shape_name}", VERSION, build)
+
+
+def light_group(kind: str) -> bpy.types.ShaderNodeTree:
+    """Return the group for a light of that kind (lights.kind_of)."""
+    if kind.startswith("AREA"):
+        return area_group(elliptic=kind.split()[1] in ELLIPTIC)
+    return {"SUN": sun_group, "POINT": point_group, "SPOT": spot_group}[kind]()
+
+
+def display_group() -> bpy.types.ShaderNodeTree:
+    """Curvature in hot colours (paper, Fig. 3a): black, red, yellow, white from low to high."""
+
+    def build(b: TreeBuilder) -> None:
+        declare(b.tree, ids.CURVATURE, default=0.0, tip="Curvature kappa")
+        declare(b.tree, ids.MINIMUM, default=0.0, tip="Shown black")
+        declare(b.tree, ids.MAXIMUM, default=1.0, tip="Shown white")
+        declare(b.tree, ids.SHADER, "Shader", output=True)
+        given, result = _ends(b)
+        part = b.node("ShaderNodeMapRange", clamp=True)
+        b.feed(part.inputs["Value"], given[ids.CURVATURE])
+        b.feed(part.inputs["From Min"], given[ids.MINIMUM])
+        b.feed(part.inputs["From Max"], given[ids.MAXIMUM])
+        ramp = b.node("ShaderNodeValToRGB")
+        stops = ramp.color_ramp.elements
+        for position, colour in ((1 / 3, (1, 0, 0, 1)), (2 / 3, (1, 1, 0, 1))):
+            stops.new(position).color = colour
+        stops[0].color, stops[-1].color = (0, 0, 0, 1), (1, 1, 1, 1)
+        b.feed(ramp.inputs["Fac"], part.outputs["Result"])
+        emission = b.node("ShaderNodeEmission")
+        b.feed(emission.inputs["Color"], ramp.outputs["Color"])
+        b.feed(result[ids.SHADER], emission.outputs["Emission"])
+
+    return ensure_group("CDRF Curvature Display", ids.ROLE_DISPLAY, VERSION, build)

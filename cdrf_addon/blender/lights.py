@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lights of a scene and the drivers that carry them into the node group.
+
+Every driver is a *simple expression* over properties: Blender evaluates those without Python, so
+they work with Auto-Run off, in background renders and without the extension. Everything is read
+through the light's object, so that a light moved, parented, animated, relinked or switched off is
+followed without a click.
+
+A path into a matrix names the column first: matrix_world[2][0] is the x of the lamp's Z axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import bpy
+
+from .. import ids
+
+AXES = {ids.AXIS_X: 0, ids.AXIS_Y: 1, ids.AXIS_Z: 2, ids.POSITION: 3}
+
+# Constants between Blender's power and the radiance of a white Lambert surface facing the light
+# (docs/decisions/003-radiometry.md): sun E / pi, point and spot P / (4 pi^2 d^2), area P / pi^2.
+CONSTANTS = {
+    "SUN": 1.0 / math.pi,
+    "POINT": 1.0 / (4.0 * math.pi**2),
+    "SPOT": 1.0 / (4.0 * math.pi**2),
+    "AREA": 1.0 / math.pi**2,
+}
+ONE_SIZE = {"SQUARE", "DISK"}
+
+
+@dataclass(frozen=True)
+class SceneLight:
+    """A light that can reach the camera's picture of a scene."""
+
+    object: bpy.types.Object
+    kind: str
+    """Type of the light, and shape of an area light: "SUN", "AREA ELLIPSE"."""
+
+    @property
+    def type(self) -> str:
+        """SUN, POINT, SPOT or AREA."""
+        return self.kind.split()[0]
+
+
+def kind_of(light: bpy.types.Light) -> str:
+    """Describe what decides a light's node branch; see `SceneLight.kind`."""
+    return f"AREA {light.shape}" if light.type == "AREA" else light.type
+
+
+def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[SceneLight]:
+    """List the lights that a render of this view layer would use, by name.
+
+    A light that is switched off for renders is left out, unless its visibility is animated.
+    """
+    shown = _render_visible(view_layer.layer_collection)
+    found = []
+    for item in view_layer.objects:
+        if item.type != "LIGHT" or item.name not in shown:
+            continue
+        if item.hide_render and not _animates(item, "hide_render"):
+            continue
+        found.append(SceneLight(item, kind_of(item.data)))
+    return sorted(found, key=lambda light: light.object.name)
+
+
+def _render_visible(layer: bpy.types.LayerCollection) -> set[str]:
+    if layer.exclude or layer.collection.hide_render or layer.holdout:
+        return set()
+    names = {item.name for item in layer.collection.objects}
+    for child in layer.children:
+        names |= _render_visible(child)
+    return names
+
+
+def _animates(item: bpy.types.Object, path: str) -> bool:
+    data = item.animation_data
+    if data is None:
+        return False
+    if any(driver.data_path == path for driver in data.drivers):
+        return True
+    # An action's curves lie elsewhere in every version; that it has one is reason enough.
+    return data.action is not None or len(data.nla_tracks) > 0
+
+
+def drive_light(
+    tree: bpy.types.ShaderNodeTree, node: bpy.types.ShaderNode, light: SceneLight
+) -> None:
+    """Drive the inputs of a light group's instance from the light's object."""
+    lamp = light.object
+    inputs = node.inputs
+    for name, column in AXES.items():
+        if name in inputs:
+            for row in range(3):
+                path = f"matrix_world[{column}][{row}]"
+                drive(tree, inputs[name], lamp, "v", {"v": path}, row)
+    for channel in range(3):
+        expression, paths = _power(light, channel)
+        drive(tree, inputs[ids.POWER], lamp, expression, paths, channel)
+    for name, (expression, paths) in _settings(light).items():
+        drive(tree, inputs[name], lamp, expression, paths)
+
+
+def _power(light: SceneLight, channel: int) -> tuple[str, dict[str, str]]:
+    paths = {
+        "e": "data.energy",
+        "x": "data.exposure",
+        "c": f"data.color[{channel}]",
+        "t": f"data.temperature_color[{channel}]",
+        "d": "data.diffuse_factor",
+        "h": "hide_render",
+        "q": "visible_diffuse",
+    }
+    expression = f"{CONSTANTS[light.type]!r}*e*pow(2,x)*c*t*d*(1-h)*q"
+    # Without Normalize, power is per area; an area light's group sees to its own.
+    if light.type == "SUN":
+        paths |= {"n": "data.normalize", "a": "data.angle"}
+        expression += "*(n+(1-n)*pi*pow(sin(a/2),2))"
+    elif light.type in {"POINT", "SPOT"}:
+        paths |= {"n": "data.normalize", "r": "data.shadow_soft_size"}
+        expression += "*(n+(1-n)*4*pi*r*r)"
+    return expression, paths
+
+
+def _settings(light: SceneLight) -> dict[str, tuple[str, dict[str, str]]]:
+    if light.type == "SUN":
+        # EEVEE's limits: half-angles from 0.001 rad to just under a right angle.
+        return {
+            ids.SIN2_HALF_ANGLE: ("pow(sin(min(a,3.1398)/2),2)", {"a": "data.angle"}),
+        }
+    settings = {ids.INVERSE_RANGE2: _inverse_range2()}
+    if light.type in {"POINT", "SPOT"}:
+        settings[ids.RADIUS] = ("r", {"r": "data.shadow_soft_size"})
+        settings[ids.SOFT_FALLOFF] = ("s", {"s": "data.use_soft_falloff"})
+    if light.type == "SPOT":
+        cone = {"s": "data.spot_size"}
+        settings[ids.CONE_COSINE] = ("cos(s/2)", cone)
+        settings[ids.CONE_SHARPNESS] = (
+            "1/max(1e-8,(1-cos(s/2))*b)",
+            cone | {"b": "data.spot_blend"},
+        )
+    if light.type == "AREA":
+        second = "data.size" if light.kind.split()[1] in ONE_SIZE else "data.size_y"
+        settings[ids.HALF_X] = ("s/2", {"s": "data.size"})
+        settings[ids.HALF_Y] = ("s/2", {"s": second})
+        settings[ids.NORMALIZE] = ("n", {"n": "data.normalize"})
+    return settings
+
+
+def _inverse_range2() -> tuple[str, dict[str, str]]:
+    """EEVEE's cut-off: the custom distance, or where the light falls below the threshold."""
+    paths = {
+        "u": "data.use_custom_distance",
+        "k": "data.cutoff_distance",
+        "e": "data.energy",
+        "x": "data.exposure",
+        "d": "data.diffuse_factor",
+        "s": "data.specular_factor",
+        "h": "scene:eevee.light_threshold",
+    }
+    for name, path in (("c", "color"), ("t", "temperature_color")):
+        paths |= {f"{name}{i}": f"data.{path}[{i}]" for i in range(3)}
+    peak = "max(c0*t0,max(c1*t1,c2*t2))*abs(e)*pow(2,x)*max(d,s)"
+    return f"1/max(1e-12,u*k*k+(1-u)*{peak}/max(1e-8,100*h))", paths
+
+
+def drive(
+    tree: bpy.types.ShaderNodeTree,
+    socket: bpy.types.NodeSocket,
+    source: bpy.types.Object,
+    expression: str,
+    paths: Mapping[str, str],
+    index: int = -1,
+) -> None:
+    """Drive a socket's default by an expression over properties of `source`.
+
+    Args:
+        tree: The node tree that owns the driver.
+        socket: An unlinked input; addressed by node and socket name, which survives reordering.
+        source: Object the paths start from. A path "scene:..." starts from the active scene.
+        expression: Over the names of `paths`, in Blender's Python-free subset.
+        paths: Property path of each name.
+        index: Component of a vector socket, -1 for a scalar.
+    """
+    node = bpy.utils.escape_identifier(socket.node.name)
+    path = f'nodes["{node}"].inputs["{socket.name}"].default_value'
+    curve = tree.driver_add(path, index) if index >= 0 else tree.driver_add(path)
+    driver = curve.driver
+    driver.type = "SCRIPTED"
+    for name, where in paths.items():
+        variable = driver.variables.new()
+        variable.name = name
+        if where.startswith("scene:"):
+            variable.type = "CONTEXT_PROP"
+            variable.targets[0].context_property = "ACTIVE_SCENE"
+            variable.targets[0].data_path = where.removeprefix("scene:")
+        else:
+            variable.targets[0].id = source
+            variable.targets[0].data_path = where
+    driver.expression = expression
+    if not driver.is_simple_expression:
+        raise ValueError(f"this driver would need Python: {expression}")

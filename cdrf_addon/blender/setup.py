@@ -1,0 +1,418 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The main job: from objects to translucent materials, in steps that can be shown and cancelled.
+
+`Setup.steps` gathers and computes and changes nothing the artist would see; `Setup.commit` writes
+everything at once. Whatever fails, fails before the first write.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from .. import ids
+from ..compat import EEVEE
+from ..core.curvature import DEFAULT_RADIUS, curvature_steps
+from ..core.errors import CdrfError, SceneError
+from ..core.summary import CONSTANT, FLAT, CurvatureSummary, summarise
+from . import shader, state
+from .lights import SceneLight, scene_lights
+from .materials import cdrf_node, install, require_editable
+from .mesh_io import (
+    Shape,
+    base_fingerprint,
+    has_curvature,
+    read_shape,
+    remove_curvature,
+    to_original_vertices,
+    write_curvature,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# sigma of the first look, at the median curvature: visible, not yet wax.
+FIRST_SIGMA = 0.25
+SAME_SIZE = 1e-4
+
+
+@dataclass
+class Report:
+    """What a job did, in numbers and in sentences for the artist."""
+
+    objects: int = 0
+    materials: int = 0
+    vertices: int = 0
+    computed: int = 0
+    seconds: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+
+    def sentence(self) -> str:
+        """Sum it up in one line."""
+        parts = [f"{self.objects} object{'s' if self.objects != 1 else ''}"]
+        parts.append(f"{self.materials} material{'s' if self.materials != 1 else ''}")
+        if self.computed:
+            parts.append(f"curvature at {self.vertices:,} vertices in {self.seconds:.2f} s")
+        else:
+            parts.append("curvature was up to date")
+        return ", ".join(parts)
+
+
+@dataclass
+class _MeshWork:
+    """One mesh to be dealt with, and what came of it."""
+
+    mesh: bpy.types.Mesh
+    users: list[bpy.types.Object] = field(default_factory=list)
+    sizes: dict[str, float] = field(default_factory=dict)
+    """Size of each user relative to the first, by object name."""
+    fingerprint: str = ""
+    metric: NDArray[np.float64] | None = None
+    summary: CurvatureSummary | None = None
+    """None where nothing had to be computed."""
+    values: NDArray[np.float32] | None = None
+    evaluated_vertices: int = 0
+    seconds: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def kind(self) -> str:
+        return self.summary.kind if self.summary else self.mesh.cdrf.kind
+
+    @property
+    def mean_values(self) -> tuple[float, ...]:
+        return self.summary.mean_values if self.summary else tuple(self.mesh.cdrf.mean_values)
+
+    @property
+    def median(self) -> float:
+        return self.summary.median if self.summary else self.mesh.cdrf.median
+
+
+class Setup:
+    """Makes objects translucent, or brings translucent ones up to date.
+
+    Args:
+        context: For the scene, the view layer and the dependency graph.
+        objects: What to work on; other users of the same materials are included by themselves.
+        radius: Rings of the curvature fit.
+        only_active_slot: Convert an object's active material slot only.
+        convert: False to leave materials alone that are not translucent yet.
+        recompute: True to estimate the curvature even where nothing has changed.
+
+    Raises:
+        SceneError: There is nothing to work on, or something may not be changed.
+    """
+
+    def __init__(
+        self,
+        context: bpy.types.Context,
+        objects: Iterable[bpy.types.Object],
+        *,
+        radius: int = DEFAULT_RADIUS,
+        only_active_slot: bool = False,
+        convert: bool = True,
+        recompute: bool = False,
+    ) -> None:
+        self.scene = context.scene
+        self.view_layer = context.view_layer
+        self.depsgraph = context.evaluated_depsgraph_get()
+        self.radius = radius
+        self.recompute = recompute
+        self.report = Report()
+        self.slots: list[bpy.types.MaterialSlot] = []
+        self.bare: list[bpy.types.Object] = []
+        self._choose(list(objects), only_active_slot, convert)
+        self.work = self._gather()
+
+    # --- gathering ----------------------------------------------------------------------------
+
+    def _choose(
+        self, objects: list[bpy.types.Object], only_active_slot: bool, convert: bool
+    ) -> None:
+        """Find the material slots to convert and the objects that need a first material."""
+        self.objects = []
+        for item in objects:
+            if item.type != "MESH":
+                if convert and item.type not in {"LIGHT", "CAMERA", "EMPTY"}:
+                    self.report.warnings.append(
+                        f"'{item.name}' is not a mesh: convert it first (Object > Convert > Mesh)."
+                    )
+                continue
+            if item.mode == "EDIT":
+                raise SceneError(f"'{item.name}' is in Edit Mode: leave it first (Tab).")
+            self.objects.append(item)
+        if not self.objects:
+            raise SceneError(
+                "No mesh object is selected: click the object that should become translucent."
+                if convert
+                else "Nothing in this scene is translucent yet: press Make Translucent first."
+            )
+        for item in self.objects:
+            slots = list(item.material_slots)
+            if only_active_slot and slots:
+                slots = [slots[item.active_material_index]]
+            if not convert:
+                slots = [slot for slot in slots if cdrf_node(slot.material) is not None]
+            elif not slots:
+                require_editable(item.data)
+                self.bare.append(item)
+            for slot in slots:
+                require_editable(slot.material or item.data)
+            self.slots += slots
+
+    def _gather(self) -> list[_MeshWork]:
+        """Group by mesh all objects of the scene that show one of the materials."""
+        materials = {slot.material for slot in self.slots if slot.material is not None}
+        users = list(self.objects)
+        for item in self.view_layer.objects:
+            if item.type == "MESH" and item not in users and materials & _materials(item):
+                users.append(item)
+        others = len(users) - len(self.objects)
+        if others:
+            self.report.warnings.append(
+                f"{others} more object{'s' if others > 1 else ''} with the same material "
+                f"{'are' if others > 1 else 'is'} translucent with it."
+            )
+        work: dict[bpy.types.Mesh, _MeshWork] = {}
+        for item in users:
+            require_editable(item.data)
+            work.setdefault(item.data, _MeshWork(item.data)).users.append(item)
+        return list(work.values())
+
+    # --- computing ----------------------------------------------------------------------------
+
+    def steps(self) -> Generator[tuple[float, str], None, None]:
+        """Compute what has changed, yielding the part done and what is being done.
+
+        Raises:
+            CdrfError: A mesh cannot be used; nothing has been changed.
+        """
+        sizes = [max(len(work.mesh.vertices), 1) for work in self.work]
+        total, done = float(sum(sizes)), 0
+        for work, size in zip(self.work, sizes, strict=True):
+            for part in self._compute(work):
+                yield (done + part * size) / total, f"Curvature of {work.users[0].name}"
+            done += size
+
+    def _compute(self, work: _MeshWork) -> Generator[float, None, None]:
+        start = time.perf_counter()
+        first, *others = work.users
+        shape = read_shape(first, self.depsgraph, self.radius)
+        for other in others:
+            work.sizes[other.name] = self._relative_size(other, shape, first)
+        work.sizes[first.name] = 1.0
+        work.fingerprint = shape.fingerprint
+        work.metric = shape.metric
+        work.evaluated_vertices = len(shape.mesh.vertices)
+        known = work.mesh.cdrf
+        kept = known.kind in {FLAT, CONSTANT} or has_curvature(work.mesh)
+        if known.fingerprint == shape.fingerprint and kept and not self.recompute:
+            yield 1.0
+            return
+        try:
+            field_ = yield from curvature_steps(shape.mesh, self.radius)
+        except CdrfError as error:
+            raise type(error)(f"'{first.name}': {error}") from error
+        work.summary = summarise(shape.mesh, field_)
+        work.warnings = field_.sentences()
+        values = np.stack((field_.kappa, field_.k1, field_.k2, field_.mean), axis=1)
+        limit = np.finfo(np.float32).max
+        stored = np.clip(values, -limit, limit).astype(np.float32)
+        work.values, lost = to_original_vertices(first, self.depsgraph, stored)
+        if lost:
+            work.warnings.append(
+                f"{lost:,} vertices do not survive the modifiers; their curvature is that of the "
+                "nearest point. Apply the modifiers for exact values."
+            )
+        work.seconds = time.perf_counter() - start
+
+    def _relative_size(
+        self, other: bpy.types.Object, shape: Shape, first: bpy.types.Object
+    ) -> float:
+        factor = read_shape(other, self.depsgraph, self.radius).size_relative_to(shape)
+        if factor is None:
+            raise SceneError(
+                f"'{other.name}' and '{first.name}' share a mesh, but modifiers or scale give them "
+                "different shapes: make one single-user "
+                "(Object > Relations > Make Single User > Object & Data)."
+            )
+        return factor
+
+    # --- writing ------------------------------------------------------------------------------
+
+    def commit(self) -> Report:
+        """Write attributes, groups and materials; the only part that changes the file."""
+        self._give_materials()
+        lights = scene_lights(self.scene, self.view_layer)
+        sources = {
+            material: self._source(material)
+            for material in dict.fromkeys(slot.material for slot in self.slots)
+        }
+        for work in self.work:
+            self._store(work, sources)
+        for material, source in sources.items():
+            self._install(material, source, lights)
+        remove_unused_groups()
+        self._sum_up(lights, sources)
+        return self.report
+
+    def _give_materials(self) -> None:
+        for item in self.bare:
+            item.data.materials.append(_new_material(item.name))
+            self.slots.append(item.material_slots[0])
+        for slot in self.slots:
+            if slot.material is None:
+                slot.material = _new_material(slot.id_data.name)
+
+    def _work_of(self, material: bpy.types.Material) -> list[_MeshWork]:
+        return [
+            work for work in self.work if any(material in _materials(item) for item in work.users)
+        ]
+
+    def _source(self, material: bpy.types.Material) -> str:
+        """Decide where the shader takes kappa from: the least that serves all users."""
+        work = self._work_of(material)
+        if all(item.kind == FLAT for item in work):
+            return shader.FLAT
+        if any(abs(size - 1.0) > SAME_SIZE for item in work for size in item.sizes.values()):
+            return shader.SCALED
+        if all(item.kind == CONSTANT for item in work):
+            kappas = [item.mean_values[0] for item in work]
+            if max(kappas) - min(kappas) <= 0.01 * max(kappas):
+                return shader.CONSTANT
+        return shader.ATTRIBUTE
+
+    def _store(self, work: _MeshWork, sources: dict[bpy.types.Material, str]) -> None:
+        needed = any(
+            sources.get(material) in {shader.ATTRIBUTE, shader.SCALED}
+            for item in work.users
+            for material in _materials(item)
+        )
+        if not needed:
+            remove_curvature(work.mesh)
+        elif work.values is not None:
+            write_curvature(work.mesh, work.values)
+        elif not has_curvature(work.mesh):
+            # A constant mesh that now shares its material with one that is not.
+            constant = np.array(work.mean_values, dtype=np.float32)
+            write_curvature(work.mesh, np.tile(constant, (len(work.mesh.vertices), 1)))
+        for item in work.users:
+            scaled = any(sources.get(m) == shader.SCALED for m in _materials(item))
+            if scaled:
+                item[ids.SCALE_KEY] = 1.0 / work.sizes[item.name]
+            elif ids.SCALE_KEY in item:
+                del item[ids.SCALE_KEY]
+        if work.summary is not None:
+            _remember(work, self.radius)
+
+    def _install(self, material: bpy.types.Material, source: str, lights: list[SceneLight]) -> None:
+        settings = material.cdrf
+        fresh = cdrf_node(material) is None
+        ratio = tuple(settings.sigma0_ratio)
+        group = shader.ensure_shader_group(shader.variant_of(ratio, source), self.scene, lights)
+        node = install(material, group)
+        work = self._work_of(material)
+        if fresh:
+            node.inputs[ids.SIGMA0_RATIO].default_value = ratio
+            if settings.chosen_sigma0 < 0.0:
+                settings.chosen_sigma0 = _first_sigma0(work)
+            node.inputs[ids.SIGMA0].default_value = settings.chosen_sigma0
+        if source == shader.CONSTANT:
+            kappas = [item.mean_values[0] for item in work]
+            node.inputs[ids.CURVATURE].default_value = float(np.mean(kappas))
+
+    def _sum_up(self, lights: list[SceneLight], sources: dict[bpy.types.Material, str]) -> None:
+        report = self.report
+        report.objects = sum(len(work.users) for work in self.work)
+        report.materials = len(sources)
+        for work in self.work:
+            if work.summary is not None:
+                report.computed += 1
+                report.vertices += work.evaluated_vertices
+                report.seconds += work.seconds
+                report.warnings += [f"'{work.users[0].name}': {line}" for line in work.warnings]
+            if work.kind == FLAT:
+                report.warnings.append(
+                    f"'{work.users[0].name}' is flat: it looks the same at any scatter distance."
+                )
+        if not lights:
+            report.warnings.append("The scene has no light that renders, so the surface is black.")
+        if self.scene.render.engine not in {EEVEE, "BLENDER_WORKBENCH"}:
+            report.warnings.append(
+                "This scene renders with another engine: choose EEVEE in the Render properties to "
+                "see the translucency."
+            )
+
+
+def run(job: Setup) -> Report:
+    """Do a whole job at once."""
+    for _ in job.steps():
+        pass
+    return job.commit()
+
+
+def translucent_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """List the mesh objects of a view layer that show a CDRF material of this file."""
+    return [
+        item
+        for item in view_layer.objects
+        if item.type == "MESH"
+        and any(cdrf_node(material) and material.is_editable for material in _materials(item))
+    ]
+
+
+def scene_of_group(
+    group: bpy.types.ShaderNodeTree,
+) -> tuple[bpy.types.Scene, list[SceneLight]] | None:
+    """Return the scene a shader group was made for and its lights; None if it is gone."""
+    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, ""))
+    if scene is None:
+        return None
+    current = bpy.context.view_layer
+    layer = current if bpy.context.scene == scene else scene.view_layers[0]
+    return scene, scene_lights(scene, layer)
+
+
+def remove_unused_groups() -> None:
+    """Delete our shader groups that no material uses any more."""
+    for group in list(bpy.data.node_groups):
+        if shader.is_shader_group(group) and group.users == 0 and group.library is None:
+            bpy.data.node_groups.remove(group)
+
+
+def _materials(item: bpy.types.Object) -> set[bpy.types.Material]:
+    return {slot.material for slot in item.material_slots if slot.material is not None}
+
+
+def _new_material(name: str) -> bpy.types.Material:
+    return bpy.data.materials.new(f"{name} Translucent")
+
+
+def _first_sigma0(work: list[_MeshWork]) -> float:
+    """Choose a sigma0 at which the middle of the mesh is visibly translucent, in two digits."""
+    medians = [item.median for item in work if item.kind != FLAT and item.median > 0.0]
+    if not medians:
+        return 0.0
+    return float(f"{FIRST_SIGMA / float(np.median(medians)):.2g}")
+
+
+def _remember(work: _MeshWork, radius: int) -> None:
+    known, summary = work.mesh.cdrf, work.summary
+    assert summary is not None and work.metric is not None
+    known.fingerprint = work.fingerprint
+    known.base_fingerprint = base_fingerprint(work.mesh)
+    known.kind = summary.kind
+    known.low, known.median, known.high = summary.low, summary.median, summary.high
+    known.mean_values = summary.mean_values
+    known.metric = work.metric.ravel()
+    known.radius = radius
+    known.vertices = len(work.mesh.vertices)
+    known.evaluated_vertices = work.evaluated_vertices
+    known.seconds = work.seconds
+    known.warnings = "\n".join(work.warnings)
+    state.mark_current(work.mesh)

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scene's CDRF shader group: the sum over its lights of paper Eq. 5, and nothing it lacks.
+
+A variant is made for each way of having curvature and of sharing sigma0 between channels; the
+branches are one per light. Wiring:
+
+    attribute kappa -> x Sigma0 x Ratio -> squared = variance --------+
+    Normal (or geometry) --+                                          |
+    light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance
+            -> Radiance ------------------------------> x f --> sum over i --> x Base Color
+                                                                           x Strength -> Emission
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+from .. import ids
+from .groups import light_group, reflectance_group
+from .lights import SceneLight, drive_light
+from .nodetree import TreeBuilder, declare, rebuild
+
+VERSION = 1
+
+FLAT, CONSTANT, ATTRIBUTE, SCALED = "flat", "constant", "attribute", "scaled attribute"
+"""Where kappa comes from: nowhere, the Curvature input, the mesh, the mesh and the object."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What decides the content of a shader group, apart from the lights."""
+
+    channels: str
+    """Look-ups: see groups.CHANNEL_SETS."""
+    source: str
+    """FLAT, CONSTANT, ATTRIBUTE or SCALED."""
+
+    @property
+    def name(self) -> str:
+        """Name of the node group."""
+        lookups = "+".join(self.channels.split())
+        return f"CDRF {lookups}" + ("" if self.source == ATTRIBUTE else f" {self.source}")
+
+
+def variant_of(ratio: Sequence[float], source: str) -> Variant:
+    """Choose the variant with one look-up per distinct sigma0.
+
+    A flat mesh has sigma = 0 in every channel, whatever the ratio: one look-up.
+    """
+    if source == FLAT:
+        return Variant("RGB", FLAT)
+    red, green, blue = ratio
+    if red == green == blue:
+        channels = "RGB"
+    elif green == blue:
+        channels = "R GB"
+    elif red == green:
+        channels = "RG B"
+    elif red == blue:
+        channels = "RB G"
+    else:
+        channels = "R G B"
+    return Variant(channels, source)
+
+
+def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
+    """Read back the variant of a group made by `ensure_shader_group`."""
+    return Variant(group[ids.CHANNELS_KEY], group[ids.SOURCE_KEY])
+
+
+def is_shader_group(group: bpy.types.ShaderNodeTree | None) -> bool:
+    """Tell whether a node group is one of ours, whoever renamed or linked it."""
+    return group is not None and group.get(ids.ROLE_KEY) == ids.ROLE_SHADER
+
+
+def ensure_shader_group(
+    variant: Variant, scene: bpy.types.Scene, lights: Sequence[SceneLight]
+) -> bpy.types.ShaderNodeTree:
+    """Return the scene's group of that variant, its light branches brought up to date."""
+    group = _find(variant, scene)
+    if group is None:
+        group = bpy.data.node_groups.new(variant.name, "ShaderNodeTree")
+        group[ids.ROLE_KEY] = ids.ROLE_SHADER
+        group[ids.CHANNELS_KEY] = variant.channels
+        group[ids.SOURCE_KEY] = variant.source
+        group[ids.SCENE_KEY] = scene.name
+        group.color_tag = "SHADER"
+        group.description = "Curvature-dependent translucency (Kubo et al. 2011), made by CDRF"
+    elif is_current(group, lights):
+        return group
+    rebuild(group, lambda builder: _build(builder, variant, lights))
+    group[ids.VERSION_KEY] = VERSION
+    return group
+
+
+def _find(variant: Variant, scene: bpy.types.Scene) -> bpy.types.ShaderNodeTree | None:
+    for group in bpy.data.node_groups:
+        if (
+            group.library is None
+            and is_shader_group(group)
+            and stamped_variant(group) == variant
+            and group[ids.SCENE_KEY] == scene.name
+        ):
+            return group
+    return None
+
+
+def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -> bool:
+    """Tell whether the group has exactly these lights, each of the type it was wired for."""
+    wanted = {(light.object, light.kind) for light in lights}
+    return group.get(ids.VERSION_KEY) == VERSION and set(wired_lights(group)) == wanted
+
+
+def wired_lights(
+    group: bpy.types.ShaderNodeTree,
+) -> list[tuple[bpy.types.Object | None, str]]:
+    """List the lights of a group and the kind they were wired for; None where one was deleted.
+
+    The drivers' targets are asked, not names: they survive renaming.
+    """
+    targets: dict[str, bpy.types.Object | None] = {}
+    if group.animation_data is not None:
+        for curve in group.animation_data.drivers:
+            name = curve.data_path.split('"')[1]
+            targets[bpy.utils.unescape_identifier(name)] = curve.driver.variables[0].targets[0].id
+    return [
+        (targets.get(node.name), node[ids.LIGHT_KEY])
+        for node in group.nodes
+        if ids.LIGHT_KEY in node
+    ]
+
+
+def _declare(tree: bpy.types.ShaderNodeTree) -> None:
+    declare(
+        tree,
+        ids.BASE_COLOR,
+        "Color",
+        default=(0.8, 0.8, 0.8, 1.0),
+        tip="Albedo k_d: the colour of the surface in white light",
+    )
+    declare(
+        tree,
+        ids.SIGMA0,
+        default=0.0,
+        low=0.0,
+        high=1e6,
+        subtype="DISTANCE",
+        tip="How far light travels under the surface. 0 is an opaque (Lambert) surface",
+    )
+    declare(
+        tree,
+        ids.SIGMA0_RATIO,
+        "Vector",
+        default=(1.0, 1.0, 1.0),
+        low=0.0,
+        high=1e3,
+        tip="Sigma0 of red, green and blue, as factors of Sigma0",
+    )
+    declare(
+        tree,
+        ids.NORMAL,
+        "Vector",
+        default=(0.0, 0.0, 0.0),
+        tip="Normal or bump map; unconnected, the surface's own normal",
+    )
+    declare(tree, ids.STRENGTH, default=1.0, low=0.0, high=1e6, tip="Factor on the result")
+    declare(tree, ids.SHADER, "Shader", output=True)
+
+
+def _build(b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight]) -> None:
+    _declare(b.tree)
+    if variant.source == CONSTANT:
+        declare(
+            b.tree, ids.CURVATURE, default=0.0, low=0.0, tip="Curvature of the whole mesh, 1/length"
+        )
+    given = b.node("NodeGroupInput").outputs
+    result = b.node("NodeGroupOutput").inputs
+    total: Any = (0.0, 0.0, 0.0)
+    if lights:
+        normal = _normal(b, given[ids.NORMAL])
+        variance = _skin_variance(b, variant, given)
+        reflectance = reflectance_group(variant.channels)
+    for light in lights:
+        node = b.group(light_group(light.kind), light.object.name)
+        node[ids.LIGHT_KEY] = light.kind
+        drive_light(b.tree, node, light)
+        lit = node.outputs
+        f = b.group(
+            reflectance,
+            f"Reflectance {node.name}",
+            Cosine=b.vector("DOT_PRODUCT", normal, lit[ids.DIRECTION]),
+            Variance=b.vector("ADD", variance, lit[ids.VARIANCE]),
+        ).outputs[ids.REFLECTANCE]
+        total = b.vector("MULTIPLY_ADD", f, lit[ids.RADIANCE], total)
+    emission = b.node("ShaderNodeEmission")
+    b.feed(emission.inputs["Color"], b.vector("MULTIPLY", total, given[ids.BASE_COLOR]))
+    b.feed(emission.inputs["Strength"], given[ids.STRENGTH])
+    b.feed(result[ids.SHADER], emission.outputs["Emission"])
+
+
+def _normal(b: TreeBuilder, given: Any) -> Any:
+    """Use the Normal input, or the geometry's where nothing is connected (a zero vector)."""
+    own = b.node("ShaderNodeNewGeometry").outputs["Normal"]
+    unset = b.math("LESS_THAN", b.vector("DOT_PRODUCT", given, given), 1e-12)
+    return b.vector("NORMALIZE", b.vector("ADD", given, b.vector("SCALE", own, scale=unset)))
+
+
+def _skin_variance(b: TreeBuilder, variant: Variant, given: Any) -> Any:
+    """Square of sigma = sigma0 kappa per channel, as a vector."""
+    if variant.source == FLAT:
+        return (0.0, 0.0, 0.0)
+    if variant.source == CONSTANT:
+        kappa = given[ids.CURVATURE]
+    else:
+        kappa = curvature_nodes(b, scaled=variant.source == SCALED)
+    sigma = b.math("MULTIPLY", given[ids.SIGMA0], kappa)
+    width = b.vector("SCALE", given[ids.SIGMA0_RATIO], scale=sigma)
+    return b.vector("MULTIPLY", width, width)
+
+
+def curvature_nodes(b: TreeBuilder, *, scaled: bool) -> Any:
+    """Kappa from the mesh; where objects of several sizes share it, corrected by the object's."""
+    attribute = b.node("ShaderNodeAttribute", attribute_name=ids.CURVATURE_ATTRIBUTE)
+    parts = b.node("ShaderNodeSeparateColor")
+    b.feed(parts.inputs["Color"], attribute.outputs["Color"])
+    kappa = parts.outputs["Red"]
+    if not scaled:
+        return kappa
+    size = b.node("ShaderNodeAttribute", attribute_type="OBJECT", attribute_name=ids.SCALE_KEY)
+    return b.math("MULTIPLY", kappa, size.outputs["Fac"])

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is out of date, in words; cheap enough to ask at every redraw of the panel.
+
+A depsgraph handler only notes which meshes were touched; their positions are hashed once after
+that, when somebody asks, and never during playback or outside Object Mode.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from .. import ids
+from . import shader
+from .lights import SceneLight, scene_lights
+from .materials import cdrf_node
+from .mesh_io import base_fingerprint, has_curvature, linear_part
+
+_touched: set[int] = set()
+"""session_uid of meshes edited since their hash was last compared."""
+_changed: dict[int, bool] = {}
+"""Outcome of that comparison."""
+
+
+@bpy.app.handlers.persistent
+def note_touched(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Handler: remember edited meshes; nothing else, as this runs at every update."""
+    for update in depsgraph.updates:
+        if update.is_updated_geometry and isinstance(update.id, bpy.types.Mesh):
+            _touched.add(update.id.original.session_uid)
+
+
+@bpy.app.handlers.persistent
+def forget_all(*_args: object) -> None:
+    """Handler: another file was loaded, or undo replaced the data."""
+    _touched.clear()
+    _changed.clear()
+
+
+def mark_current(mesh: bpy.types.Mesh) -> None:
+    """Take a mesh as up to date: its curvature was just written."""
+    _touched.discard(mesh.session_uid)
+    _changed[mesh.session_uid] = False
+
+
+def _mesh_changed(mesh: bpy.types.Mesh, playing: bool) -> bool:
+    uid = mesh.session_uid
+    if mesh.is_editmode or playing:
+        return _changed.get(uid, False)
+    if uid in _touched or uid not in _changed:
+        _changed[uid] = base_fingerprint(mesh) != mesh.cdrf.base_fingerprint
+        _touched.discard(uid)
+    return _changed[uid]
+
+
+def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str:
+    """Say how the scene's lights differ from those the group was made for; empty if they do not."""
+    if shader.is_current(group, lights):
+        return ""
+    wired = shader.wired_lights(group)
+    now = {light.object: light.kind for light in lights}
+    before = {item: kind for item, kind in wired if item is not None}
+    parts = []
+    for item, kind in now.items():
+        if item not in before:
+            parts.append(f"light '{item.name}' is new")
+        elif before[item] != kind:
+            parts.append(f"light '{item.name}' changed its type")
+    gone = len(wired) - len(before) + sum(item not in now for item in before)
+    if gone:
+        parts.append(f"{gone} light{'s are' if gone > 1 else ' is'} gone or hidden")
+    return "; ".join(parts) or "the node group is of an older version"
+
+
+def reasons_to_update(
+    item: bpy.types.Object,
+    scene: bpy.types.Scene,
+    view_layer: bpy.types.ViewLayer,
+    *,
+    playing: bool = False,
+) -> list[str]:
+    """List what is out of date about a translucent object, a sentence each; empty if nothing is."""
+    reasons = []
+    lights = scene_lights(scene, view_layer)
+    for slot in item.material_slots:
+        node = cdrf_node(slot.material)
+        if node is None:
+            continue
+        group = node.node_tree
+        if group.get(ids.SCENE_KEY) != scene.name:
+            reasons.append(f"'{slot.material.name}' was set up in another scene.")
+        due = lights_due(group, lights)
+        if due:
+            reasons.append(f"Lights: {due}.")
+        variant = shader.stamped_variant(group)
+        ratio = tuple(node.inputs[ids.SIGMA0_RATIO].default_value)
+        if shader.variant_of(ratio, variant.source) != variant:
+            reasons.append("The colour ratio was changed in the node.")
+        if variant.source in {shader.ATTRIBUTE, shader.SCALED} and not has_curvature(item.data):
+            reasons.append(f"'{item.name}' has no curvature yet.")
+    reasons += _shape_reasons(item, playing)
+    return list(dict.fromkeys(reasons))
+
+
+def _shape_reasons(item: bpy.types.Object, playing: bool) -> list[str]:
+    known = item.data.cdrf
+    if not known.fingerprint:
+        return [f"The curvature of '{item.name}' was never computed."]
+    if _mesh_changed(item.data, playing):
+        return ["The mesh was edited since its curvature was computed."]
+    linear = linear_part(item)
+    then = np.array(known.metric).reshape(3, 3)
+    now = linear.T @ linear * float(item.get(ids.SCALE_KEY, 1.0)) ** 2
+    if not np.allclose(now, then, rtol=0.0, atol=1e-3 * max(np.trace(now), np.trace(then))):
+        return ["The object was scaled since its curvature was computed."]
+    return []

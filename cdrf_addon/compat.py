@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All differences between Blender 4.5 LTS and 5.2 LTS; nothing else asks for the version."""
+
+from __future__ import annotations
+
+import bpy
+
+EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT"
+"""Identifier of the EEVEE engine in `scene.render.engine`."""
+
+
+def ensure_node_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.ShaderNodeTree:
+    """Return the node tree of a material or world; 4.5 makes it only on request."""
+    if owner.node_tree is None:
+        owner.use_nodes = True
+    return owner.node_tree
+
+
+def uses_nodes(material: bpy.types.Material) -> bool:
+    """Tell whether the renderer looks at the material's nodes; always so from 5.0 on."""
+    if material.node_tree is None:
+        return False
+    return bpy.app.version >= (5, 0, 0) or material.use_nodes
+
+
+def set_uses_nodes(material: bpy.types.Material, value: bool) -> None:
+    """Switch a 4.5 material between its nodes and its plain viewport colour."""
+    if bpy.app.version < (5, 0, 0) and material.use_nodes != value:
+        material.use_nodes = value

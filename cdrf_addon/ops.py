@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators: gather from the context, call, report."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, IntProperty
+
+from . import ids
+from .blender import materials, state
+from .blender.mesh_io import remove_curvature
+from .blender.setup import (
+    Report,
+    Setup,
+    remove_unused_groups,
+    translucent_objects,
+)
+from .core.curvature import DEFAULT_RADIUS
+from .core.errors import CdrfError
+from .props import CdrfMesh
+
+# Meshes up to this size are done in under half a second; above it a progress bar comes up.
+MODAL_FROM_VERTICES = 15_000
+TICK_SECONDS = 0.05
+
+
+class _Job(bpy.types.Operator):
+    """Runs a Setup at once from a script, or step by step behind a progress bar for a person.
+
+    Never registered itself; it has no bl_idname.
+    """
+
+    _job: Setup
+    _steps: Generator[tuple[float, str], None, None]
+    _timer: bpy.types.Timer
+    _start: float
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Go to Object Mode first (Tab)")
+            return False
+        return True
+
+    def make_job(self, context: bpy.types.Context) -> Setup:
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            job = self.make_job(context)
+            for _ in job.steps():
+                pass
+        except CdrfError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return self._finish(job)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        try:
+            self._job = self.make_job(context)
+        except CdrfError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if self._evaluated_vertices(context) < MODAL_FROM_VERTICES:
+            return self.execute(context)
+        self._steps = self._job.steps()
+        self._start = time.monotonic()
+        manager = context.window_manager
+        manager.progress_begin(0.0, 1.0)
+        self._timer = manager.event_timer_add(TICK_SECONDS, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == "ESC":
+            self._leave_modal(context)
+            self.report({"WARNING"}, "Stopped; nothing was changed.")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        try:
+            part, what = next(self._steps)
+        except StopIteration:
+            self._leave_modal(context)
+            return self._finish(self._job)
+        except CdrfError as error:
+            self._leave_modal(context)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        elapsed = time.monotonic() - self._start
+        left = f", {elapsed * (1.0 - part) / part:.0f} s left" if part > 0.1 else ""
+        context.window_manager.progress_update(part)
+        context.workspace.status_text_set(f"CDRF: {what}, {part:.0%}{left}   (Esc stops)")
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        self._leave_modal(context)
+
+    def _leave_modal(self, context: bpy.types.Context) -> None:
+        self._steps.close()
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        context.workspace.status_text_set(None)
+
+    def _evaluated_vertices(self, context: bpy.types.Context) -> int:
+        depsgraph = context.evaluated_depsgraph_get()
+        return sum(
+            len(work.users[0].evaluated_get(depsgraph).data.vertices) for work in self._job.work
+        )
+
+    def _finish(self, job: Setup) -> set[str]:
+        report = job.commit()
+        _tell(self, report)
+        return {"FINISHED"}
+
+
+def _tell(operator: bpy.types.Operator, report: Report) -> None:
+    for line in report.warnings:
+        operator.report({"WARNING"}, line)
+    operator.report({"INFO"}, f"CDRF: {report.sentence()}")
+
+
+class CDRF_OT_setup(_Job):
+    """Make the selected objects translucent in EEVEE: curvature, table, node group and lights"""
+
+    bl_idname = "cdrf.setup"
+    bl_label = "Make Translucent"
+    bl_options = {"REGISTER", "UNDO"}
+
+    only_active_slot: BoolProperty(
+        name="Only Active Material Slot",
+        description="Leave the object's other materials (eyes, teeth, cloth) as they are",
+        default=False,
+    )
+    radius: IntProperty(
+        name="Smoothing Rings",
+        description=(
+            "Rings of neighbouring vertices the curvature is measured over. 2 is the most exact; "
+            "3 to 5 suit noisy scans"
+        ),
+        default=DEFAULT_RADIUS,
+        min=2,
+        max=10,
+    )
+    recompute: BoolProperty(
+        name="Recompute",
+        description="Measure the curvature again even where nothing has changed",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+    def make_job(self, context: bpy.types.Context) -> Setup:
+        return Setup(
+            context,
+            context.selected_objects,
+            radius=self.radius,
+            only_active_slot=self.only_active_slot,
+            recompute=self.recompute,
+        )
+
+
+class CDRF_OT_update(_Job):
+    """Bring the scene's translucent objects up to date: new lights, edited or scaled meshes"""
+
+    bl_idname = "cdrf.update"
+    bl_label = "Update"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def make_job(self, context: bpy.types.Context) -> Setup:
+        objects = translucent_objects(context.view_layer)
+        radius = max((item.data.cdrf.radius for item in objects), default=DEFAULT_RADIUS)
+        return Setup(context, objects, radius=radius, convert=False)
+
+
+class CDRF_OT_remove(bpy.types.Operator):
+    """Make the selected objects opaque again: restores their materials and removes the curvature"""
+
+    bl_idname = "cdrf.remove"
+    bl_label = "Remove Translucency"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Go to Object Mode first (Tab)")
+            return False
+        if not any(_skins(item) for item in context.selected_objects):
+            cls.poll_message_set("Select a translucent object")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        chosen = {skin for item in context.selected_objects for skin in _skins(item)}
+        try:
+            for material in chosen:
+                materials.require_editable(material)
+        except CdrfError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        users = [item for item in context.scene.objects if chosen & set(_skins(item))]
+        for material in chosen:
+            materials.remove(material)
+        for item in users:
+            if not _skins(item) and item.data.is_editable:
+                remove_curvature(item.data)
+                item.data.cdrf.fingerprint = ""
+                if ids.SCALE_KEY in item:
+                    del item[ids.SCALE_KEY]
+        remove_unused_groups()
+        self.report({"INFO"}, f"CDRF: {len(chosen)} material(s) as before")
+        return {"FINISHED"}
+
+
+class CDRF_OT_show_curvature(bpy.types.Operator):
+    """Show the curvature in hot colours, white where it is sharpest, or the skin again"""
+
+    bl_idname = "cdrf.show_curvature"
+    bl_label = "Show Curvature"
+    bl_options = {"REGISTER", "UNDO"}
+
+    display: EnumProperty(
+        name="Display",
+        items=[
+            ("TOGGLE", "Toggle", "Switch between curvature and skin"),
+            ("ON", "Curvature", "Hot colours for high curvature"),
+            ("OFF", "Skin", "The translucent surface"),
+        ],
+        default="TOGGLE",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not translucent_objects(context.view_layer):
+            cls.poll_message_set("Nothing is translucent yet: press Make Translucent first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        objects = translucent_objects(context.view_layer)
+        skins: dict[bpy.types.Material, list[CdrfMesh]] = {}
+        for item in objects:
+            for skin in _skins(item):
+                skins.setdefault(skin, []).append(item.data.cdrf)
+        showing = any(materials.shows_curvature(skin) for skin in skins)
+        on = not showing if self.display == "TOGGLE" else self.display == "ON"
+        for skin, known in skins.items():
+            low = min(mesh.low for mesh in known)
+            high = max(mesh.high for mesh in known)
+            wanted = materials.DisplayRange(low, max(high, low * 1.001, 1e-6)) if on else None
+            materials.show_curvature(skin, wanted)
+        space = context.space_data
+        if on and space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
+            self.report({"INFO"}, "Switch the viewport to Rendered (Z) to see the curvature")
+        return {"FINISHED"}
+
+
+def _skins(item: bpy.types.Object) -> list[bpy.types.Material]:
+    return [
+        slot.material
+        for slot in item.material_slots
+        if item.type == "MESH" and materials.cdrf_node(slot.material) is not None
+    ]
+
+
+CLASSES = (CDRF_OT_setup, CDRF_OT_update, CDRF_OT_remove, CDRF_OT_show_curvature)
+
+_HANDLERS = (
+    ("depsgraph_update_post", state.note_touched),
+    ("load_post", state.forget_all),
+    ("undo_post", state.forget_all),
+    ("redo_post", state.forget_all),
+)
+
+
+def register() -> None:
+    """Register the operators and the handlers that watch for edits."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    for name, handler in reversed(_HANDLERS):
+        getattr(bpy.app.handlers, name).remove(handler)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel: in the 3D View's sidebar (tab CDRF) and in the material's properties."""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+from . import ids
+from .blender import materials, shader, state
+from .compat import EEVEE
+from .core.summary import CONSTANT, FLAT
+
+_MOST_LINES = 6
+
+
+def _wrapped(layout: bpy.types.UILayout, text: str, width: int, icon: str = "NONE") -> None:
+    for number, line in enumerate(textwrap.wrap(text, max(width, 20))):
+        layout.label(text=line, icon=icon if number == 0 else "BLANK1")
+
+
+def _characters(context: bpy.types.Context) -> int:
+    scale = context.preferences.system.ui_scale
+    return int((context.region.width - 60.0 * scale) / (7.0 * scale))
+
+
+def _active_skin(item: bpy.types.Object | None) -> bpy.types.Material | None:
+    """Return the translucent material to show: the active slot's, or the first there is."""
+    if item is None or item.type != "MESH":
+        return None
+    skins = [s.material for s in item.material_slots if materials.cdrf_node(s.material)]
+    return item.active_material if item.active_material in skins else next(iter(skins), None)
+
+
+def draw_skin(
+    layout: bpy.types.UILayout, context: bpy.types.Context, material: bpy.types.Material
+) -> None:
+    """Draw the controls of a translucent material."""
+    node = materials.cdrf_node(material)
+    assert node is not None
+    column = layout.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    column.enabled = material.is_editable
+    if node.inputs[ids.SIGMA0].is_linked:
+        column.label(text="Scatter Distance comes from a node")
+    else:
+        # The socket itself, so that I keyframes it and a file without the extension plays it.
+        column.prop(node.inputs[ids.SIGMA0], "default_value", text="Scatter Distance \u03c3\u2080")
+    column.prop(material.cdrf, "sigma0_ratio", text="Red, Green, Blue")
+    if not node.inputs[ids.BASE_COLOR].is_linked:
+        column.prop(node.inputs[ids.BASE_COLOR], "default_value", text="Base Color")
+    column.prop(node.inputs[ids.STRENGTH], "default_value", text="Strength")
+    lookups = len(shader.stamped_variant(node.node_tree).channels.split())
+    lights = len(shader.wired_lights(node.node_tree))
+    plural = "" if lookups == 1 else "s"
+    layout.label(text=f"{lookups} look-up{plural} for each of {lights} light(s)", icon="TEXTURE")
+    if not material.is_editable:
+        _wrapped(layout, "Linked: make it local to change it.", _characters(context), "LINKED")
+
+
+def draw_state(
+    layout: bpy.types.UILayout, context: bpy.types.Context, item: bpy.types.Object
+) -> None:
+    """Draw what is known of the object's curvature, and what is out of date."""
+    known = item.data.cdrf
+    width = _characters(context)
+    box = layout.box().column(align=True)
+    if known.kind == FLAT:
+        box.label(text="Flat: nothing to scatter", icon="MESH_PLANE")
+    elif known.kind == CONSTANT:
+        box.label(text=f"Curvature {known.mean_values[0]:.4g} everywhere", icon="SPHERE")
+    else:
+        box.label(text=f"Curvature {known.low:.3g} to {known.high:.3g}", icon="SPHERECURVE")
+        box.label(text=f"Median {known.median:.3g}, radius {1 / max(known.median, 1e-9):.3g}")
+    box.label(text=f"{known.evaluated_vertices:,} vertices in {known.seconds:.2f} s", icon="TIME")
+    for line in known.warnings.splitlines()[:_MOST_LINES]:
+        _wrapped(box, line, width, "INFO")
+    playing = bool(context.screen and context.screen.is_animation_playing)
+    reasons = state.reasons_to_update(item, context.scene, context.view_layer, playing=playing)
+    if reasons:
+        due = layout.box().column(align=True)
+        due.alert = True
+        for reason in reasons[:_MOST_LINES]:
+            _wrapped(due, reason, width, "ERROR")
+        due.operator("cdrf.update", icon="FILE_REFRESH")
+    else:
+        row = layout.row()
+        row.label(text="Up to date", icon="CHECKMARK")
+        row.operator("cdrf.update", text="", icon="FILE_REFRESH")
+
+
+class _View3D:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "CDRF"
+
+
+class CDRF_PT_main(_View3D, bpy.types.Panel):
+    """The one button, and the state of the active object."""
+
+    bl_label = "Translucency"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        item = context.active_object
+        skin = _active_skin(item)
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator("cdrf.setup", icon="SHADING_RENDERED")
+        if context.mode != "OBJECT":
+            layout.label(text="Leave this mode to continue (Tab)", icon="INFO")
+        elif item is None or item.type != "MESH":
+            layout.label(text="Select a mesh object", icon="INFO")
+        if skin is None:
+            return
+        engine = context.scene.render.engine
+        if engine != EEVEE:
+            layout.label(text="Shown by EEVEE only", icon="INFO")
+            layout.prop(context.scene.render, "engine", text="Render Engine")
+        layout.label(text=skin.name, icon="MATERIAL")
+        draw_skin(layout, context, skin)
+        row = layout.row(align=True)
+        shown = materials.shows_curvature(skin)
+        row.operator(
+            "cdrf.show_curvature",
+            text="Show Skin" if shown else "Show Curvature",
+            icon="HIDE_OFF",
+            depress=shown,
+        )
+        row.operator("cdrf.remove", text="", icon="TRASH")
+        draw_state(layout, context, item)
+
+
+class CDRF_PT_material(bpy.types.Panel):
+    """The same controls among the material's properties."""
+
+    bl_label = "Translucency (CDRF)"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "material"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.object is not None and context.object.type == "MESH"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        material = context.object.active_material
+        if materials.cdrf_node(material) is None:
+            layout.operator("cdrf.setup", icon="SHADING_RENDERED").only_active_slot = True
+            return
+        draw_skin(layout, context, material)
+        draw_state(layout, context, context.object)
+
+
+CLASSES = (CDRF_PT_main, CDRF_PT_material)
+
+
+def register() -> None:
+    """Register the panels."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
