@@ -47,8 +47,8 @@ def draw_skin(
         column.label(text="Scatter Distance comes from a node")
     else:
         # The socket itself, so that I keyframes it and a file without the extension plays it.
-        column.prop(node.inputs[ids.SIGMA0], "default_value", text="Scatter Distance \u03c3\u2080")
-    column.prop(material.cdrf, "sigma0_ratio", text="Red, Green, Blue")
+        column.prop(node.inputs[ids.SIGMA0], "default_value", text="Scatter \u03c3\u2080")
+    column.prop(material.cdrf, "sigma0_ratio", text="Ratio R, G, B")
     if not node.inputs[ids.BASE_COLOR].is_linked:
         column.prop(node.inputs[ids.BASE_COLOR], "default_value", text="Base Color")
     column.prop(node.inputs[ids.STRENGTH], "default_value", text="Strength")

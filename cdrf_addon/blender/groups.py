@@ -230,9 +230,10 @@ LEAST_HALF_AXES_PRODUCT = 1e-5
 def area_group(*, elliptic: bool) -> bpy.types.ShaderNodeTree:
     """Area: vector irradiance of a polygon (Lambert 1760), exact at any distance.
 
-    F = 1/2 sum over the edges of angle x unit normal of the edge's plane, V0 x V1 / |V0 x V1|; the
-    angle is atan2(|V0 x V1|, V0 . V1), which does not cancel for a small or far light. |F| / pi is
-    the form factor, F / |F| the direction from which the light comes.
+    F = 1/2 sum over the edges of angle x unit normal of the edge's plane, n / |n|, n = V0 x V1; the
+    angle is atan2(|n|, V0 . V1). n is formed as V0 x (V1 - V0) with the edge taken from the lamp's
+    axes, so that a small or far light does not cancel: 16 bits are left at size / distance = 0.001.
+    |F| / pi is the form factor, F / |F| the direction from which the light comes.
     """
     shape, axes_to_area = (ELLIPSE, math.pi) if elliptic else (RECTANGLE, 4.0)
 
@@ -248,13 +249,16 @@ def area_group(*, elliptic: bool) -> bpy.types.ShaderNodeTree:
         centre, distance2 = _towards(b, given[ids.POSITION])
         right = b.vector("SCALE", given[ids.AXIS_X], scale=given[ids.HALF_X])
         up = b.vector("SCALE", given[ids.AXIS_Y], scale=given[ids.HALF_Y])
-        corners = []
-        for x, y in shape:
-            side = b.vector("MULTIPLY_ADD", right, (x,) * 3, centre)
-            corners.append(b.vector("MULTIPLY_ADD", up, (y,) * 3, side))
+        corners = [
+            b.vector("MULTIPLY_ADD", up, (y,) * 3, b.vector("MULTIPLY_ADD", right, (x,) * 3, centre))
+            for x, y in shape
+        ]
         doubled: Any = (0.0, 0.0, 0.0)
-        for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
-            normal = b.vector("CROSS_PRODUCT", start, end)
+        for i, (start, end) in enumerate(zip(corners, corners[1:] + corners[:1], strict=True)):
+            (x0, y0), (x1, y1) = shape[i], shape[(i + 1) % len(shape)]
+            edge = b.vector("SCALE", right, scale=x1 - x0)
+            edge = b.vector("MULTIPLY_ADD", up, (y1 - y0,) * 3, edge)
+            normal = b.vector("CROSS_PRODUCT", start, edge)
             length = b.vector("LENGTH", normal)
             angle = b.math("ARCTAN2", length, b.vector("DOT_PRODUCT", start, end))
             weight = b.math("DIVIDE", angle, length)

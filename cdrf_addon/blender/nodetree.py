@@ -152,6 +152,7 @@ def declare(
     low: float | None = None,
     high: float | None = None,
     subtype: str = "",
+    hide_value: bool = False,
     tip: str = "",
 ) -> None:
     """Declare a socket of a group's interface unless it is there already."""
@@ -164,6 +165,7 @@ def declare(
     )
     if subtype:
         item.subtype = subtype
+    item.hide_value = hide_value
     if low is not None:
         item.min_value = low
     if high is not None:

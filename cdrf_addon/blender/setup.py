@@ -19,6 +19,7 @@ from .. import ids
 from ..compat import EEVEE
 from ..core.curvature import DEFAULT_RADIUS, curvature_steps
 from ..core.errors import CdrfError, SceneError
+from ..core.sphere import sphere_curvature
 from ..core.summary import CONSTANT, FLAT, CurvatureSummary, summarise
 from . import shader, state
 from .lights import SceneLight, scene_lights
@@ -215,7 +216,9 @@ class Setup:
             yield 1.0
             return
         try:
-            field_ = yield from curvature_steps(shape.mesh, self.radius)
+            field_ = sphere_curvature(shape.mesh)
+            if field_ is None:
+                field_ = yield from curvature_steps(shape.mesh, self.radius)
         except CdrfError as error:
             raise type(error)(f"'{first.name}': {error}") from error
         work.summary = summarise(shape.mesh, field_)

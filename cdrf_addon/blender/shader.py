@@ -165,6 +165,7 @@ def _declare(tree: bpy.types.ShaderNodeTree) -> None:
         ids.NORMAL,
         "Vector",
         default=(0.0, 0.0, 0.0),
+        hide_value=True,
         tip="Normal or bump map; unconnected, the surface's own normal",
     )
     declare(tree, ids.STRENGTH, default=1.0, low=0.0, high=1e6, tip="Factor on the result")

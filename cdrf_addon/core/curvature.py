@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import ParameterError
+from .errors import DependencyError, ParameterError
 from .mesh import CleaningReport, CleanMesh, TriMesh, clean
 
 if TYPE_CHECKING:
@@ -254,8 +255,7 @@ def _morton_order(vertices: Points) -> Indices:
 
 
 def _fit(part: _Part, radius: int) -> tuple[Points, Points, NDArray[np.bool_]]:
-    import igl  # late: loads scipy, 0.2 s
-
+    igl = _libigl()
     sentinel_vertices, sentinel_triangles = _sentinel()
     offset = len(sentinel_vertices)
     _, _, larger, smaller, bad = igl.principal_curvature(
@@ -272,6 +272,22 @@ def _fit(part: _Part, radius: int) -> tuple[Points, Points, NDArray[np.bool_]]:
     with np.errstate(invalid="ignore"):
         good &= (np.abs(k1) <= CURVATURE_LIMIT) & (np.abs(k2) <= CURVATURE_LIMIT)
     return np.where(good, k1, 0.0), np.where(good, k2, 0.0), good
+
+
+def _libigl() -> ModuleType:
+    """Import libigl late: it loads scipy, 0.2 s.
+
+    Raises:
+        DependencyError: It is not there; the extension's own package brings it.
+    """
+    try:
+        import igl
+    except ImportError as error:
+        raise DependencyError(
+            "The curvature library libigl is missing from this Blender: install the extension from "
+            f"its zip file, which brings libigl along ({error})."
+        ) from error
+    return igl
 
 
 def _sentinel() -> tuple[Points, Indices]:

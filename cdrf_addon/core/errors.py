@@ -18,5 +18,5 @@ class SceneError(CdrfError):
     """The scene, object or material is not in a state the operation can work on."""
 
 
-class Cancelled(CdrfError):  # noqa: N818  (the user's wish, not a fault)
-    """The user pressed Esc; nothing was changed."""
+class DependencyError(CdrfError):
+    """A library the extension needs is not installed."""

@@ -5,7 +5,7 @@ Columns: q = sign(c) sqrt|c| of c = cos theta, dense at the terminator where f b
 Rows:    w = (variance / VARIANCE_MAX)^(1/4) = sqrt(sigma / SIGMA_MAX), dense at small sigma.
 
 The shader reads the image through Blender's *tube* projection, the one that samples without mip
-levels (docs/decisions/002-lut-mapping.md). A point (sin p, cos p, v) has u = (1 - p / pi) / 2 there,
+levels (docs/decisions/002-lut-mapping.md). There (sin p, cos p, v) has u = (1 - p / pi) / 2,
 so p = pi K q with K slightly under 1 keeps clear of the seam. K and the row offset put the ends of
 both axes on texel centres, where bilinear filtering is exact.
 """

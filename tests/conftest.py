@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fixtures: the extension enabled from the checkout, and a clean, pinned scene per test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def _enabled() -> Iterator[None]:
+    import bpy
+
+    assert bpy.ops.preferences.addon_enable(module="cdrf_addon") == {"FINISHED"}
+    yield
+    bpy.ops.preferences.addon_disable(module="cdrf_addon")
+
+
+@pytest.fixture
+def rig(_enabled: None):  # type: ignore[no-untyped-def]  # bpy may not be imported at module level
+    from rig import Rig
+
+    return Rig()
