@@ -11,6 +11,7 @@ that was broken off goes on where it stopped. The exit code is 0 if every pictur
 from __future__ import annotations
 
 import argparse
+import atexit
 import hashlib
 import json
 import math
@@ -30,7 +31,7 @@ if not __package__:  # run as a file: make the package importable, then go on in
 
 import bpy
 
-from cdrf_addon import compat, register
+from cdrf_addon import compat, register, unregister
 from cdrf_addon.blender import setup, stage
 from cdrf_addon.blender.materials import cdrf_node
 from cdrf_addon.core.errors import CdrfError, ParameterError, SceneError
@@ -454,6 +455,7 @@ def run_in_process(
 
 def work(order: Path) -> int:
     """Be the process of one input."""
+    ensure_registered()
     settings = json.loads(order.read_text())
     path, stem, done, answer = (settings.pop(k) for k in ("input", "stem", "done", "answer"))
     options = argparse.Namespace(**settings)
@@ -465,8 +467,12 @@ def work(order: Path) -> int:
 
 def ensure_registered() -> None:
     """Register the extension unless Blender has it enabled already."""
-    if not hasattr(bpy.types.Material, "cdrf"):
-        register()
+    if hasattr(bpy.types.Material, "cdrf"):
+        return
+    register()
+    if not bpy.app.binary_path:
+        # bpy 4.5 as a module never returns from its exit while classes are registered.
+        atexit.register(unregister)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -474,7 +480,6 @@ def main(argv: list[str] | None = None) -> int:
     parser = make_parser()
     try:
         options = parser.parse_args(own_arguments(sys.argv) if argv is None else argv)
-        ensure_registered()
         if options.worker:
             return work(options.inputs[0])
         if options.demo:
@@ -505,6 +510,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    ensure_registered()
     start = time.perf_counter()
     summary = options.output / "summary.json"
     done = read_done(summary)

@@ -250,7 +250,9 @@ def area_group(*, elliptic: bool) -> bpy.types.ShaderNodeTree:
         right = b.vector("SCALE", given[ids.AXIS_X], scale=given[ids.HALF_X])
         up = b.vector("SCALE", given[ids.AXIS_Y], scale=given[ids.HALF_Y])
         corners = [
-            b.vector("MULTIPLY_ADD", up, (y,) * 3, b.vector("MULTIPLY_ADD", right, (x,) * 3, centre))
+            b.vector(
+                "MULTIPLY_ADD", up, (y,) * 3, b.vector("MULTIPLY_ADD", right, (x,) * 3, centre)
+            )
             for x, y in shape
         ]
         doubled: Any = (0.0, 0.0, 0.0)

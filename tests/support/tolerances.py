@@ -22,7 +22,9 @@ SHADER = Bound(
     1e-4, 3e-5, "bilinear look-up: 7.9e-5 in the ideal (core/lut.py), float32 arithmetic 1e-6"
 )
 FOUR_LIGHTS = Bound(
-    1e-3, 3e-4, "the sum of four lights peaks at 1; each light's look-up error scales with its share"
+    1e-3,
+    3e-4,
+    "the sum of four lights peaks at 1; each light's look-up error scales with its share",
 )
 DIFFUSE = Bound(
     5e-3, 2e-3, "the issue's 0.5 %; the sphere light's fit takes 0.4 % of it at 46 degrees"
