@@ -18,7 +18,7 @@ def _enabled() -> Iterator[None]:
 
 
 @pytest.fixture
-def rig(_enabled: None):  # type: ignore[no-untyped-def]  # bpy may not be imported at module level
+def rig(_enabled: None):
     from rig import Rig
 
     return Rig()

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from argparse import ArgumentTypeError
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -27,7 +28,7 @@ def run(*arguments: object) -> subprocess.CompletedProcess[str]:
     )
 
 
-def summary(folder: Path) -> dict:
+def summary(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "summary.json").read_text())
 
 

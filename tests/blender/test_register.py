@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import pytest
 
 HANDLERS = ("depsgraph_update_post", "load_post", "undo_post", "redo_post")
 
 
-def traces() -> dict[str, object]:
+def traces() -> dict[str, Any]:
     return {
         "operators": sorted(dir(bpy.ops.cdrf)),
         "classes": sorted(n for n in dir(bpy.types) if n.upper().startswith("CDRF")),

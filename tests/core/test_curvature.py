@@ -5,8 +5,8 @@ Sphere: k1 = k2 = 1 / r.
 Torus of radii R > r: k1 = 1 / r along the small circle; the normal leans by v, so the large circle,
 of radius R + r cos v, bends by k2 = cos v / (R + r cos v).
 Ellipsoid x^2/a^2 + y^2/b^2 + z^2/c^2 = 1, as a level set: with w = sum x_i^2 / a_i^4 its Gaussian
-curvature is 1 / (abc w)^2 and its mean (a^2 + b^2 + c^2 - |x|^2) / (2 (abc)^2 w^(3/2)); k1 and k2 are
-mean +- sqrt(mean^2 - Gaussian).
+curvature is 1 / (abc w)^2 and its mean (a^2 + b^2 + c^2 - |x|^2) / (2 (abc)^2 w^(3/2)); k1 and k2
+are mean +- sqrt(mean^2 - Gaussian).
 """
 
 import math
@@ -57,7 +57,7 @@ def ellipsoid(level: int, *, irregular: bool) -> Surface:
 
 
 def torus(level: int, *, irregular: bool) -> Surface:
-    """Radii 1 and 0.4, 2^(level + 1) x 2^level quads cut in two; irregular by a quarter of a cell."""
+    """Radii 1 and 0.4, 2^(level + 1) x 2^level vertices; irregular by a quarter of a cell."""
     rows, columns = 2 ** (level + 1), 2**level
     u, v = (grid.ravel() for grid in np.indices((rows, columns)).astype(np.float64))
     if irregular:

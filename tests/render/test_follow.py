@@ -7,6 +7,7 @@ import math
 import subprocess
 import sys
 import textwrap
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -20,23 +21,32 @@ from cdrf_addon.core.reflectance import reflectance
 SIGMA = 0.3
 
 
-@pytest.fixture
-def lit(rig: Rig) -> Rig:
+@dataclass
+class Lit:
     """A white sphere of sigma 0.3 under one sun, with its normals measured."""
-    rig.sun = rig.light("SUN", name='The "Key" \\ 1', energy=math.pi, angle=0.0)
-    rig.ball = rig.sphere()
+
+    rig: Rig
+    sun: bpy.types.Object
+    ball: bpy.types.Object
+    normal: np.ndarray
+    covered: np.ndarray
+
+
+@pytest.fixture
+def lit(rig: Rig) -> Lit:
+    sun = rig.light("SUN", name='The "Key" \\ 1', energy=math.pi, angle=0.0)
+    ball = rig.sphere()
     bpy.context.view_layer.update()
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    rig.ball.data.materials[0].cdrf.sigma0 = SIGMA
-    cdrf_node(rig.ball).inputs["Base Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    rig.normal, rig.covered = rig.normals(rig.ball)
-    return rig
+    ball.data.materials[0].cdrf.sigma0 = SIGMA
+    cdrf_node(ball).inputs["Base Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    return Lit(rig, sun, ball, *rig.normals(ball))
 
 
-def assert_lit_from(rig: Rig, direction: np.ndarray, energy: float = 1.0) -> None:
-    cosine = np.clip(rig.normal[rig.covered] @ (direction / np.linalg.norm(direction)), -1.0, 1.0)
+def assert_lit_from(lit: Lit, direction: np.ndarray, energy: float = 1.0) -> None:
+    cosine = np.clip(lit.normal[lit.covered] @ (direction / np.linalg.norm(direction)), -1.0, 1.0)
     expected = energy * reflectance(np.arccos(cosine), SIGMA)
-    error = rig.render()[rig.covered][:, 0] - expected
+    error = lit.rig.render()[lit.covered][:, 0] - expected
     assert np.abs(error).max() <= WRITTEN.worst * max(energy, 1.0)
 
 
@@ -46,16 +56,16 @@ def axis_of(item: bpy.types.Object) -> np.ndarray:
 
 
 @pytest.mark.smoke
-def test_rotated_parented_constrained_and_scaled(lit: Rig) -> None:
+def test_rotated_parented_constrained_and_scaled(lit: Lit) -> None:
     lit.sun.rotation_euler = (0.9, 0.2, 0.7)
     assert_lit_from(lit, axis_of(lit.sun))
 
-    parent = lit.link(None, rotation=(0.3, -0.8, 0.4))
+    parent = lit.rig.link(None, rotation=(0.3, -0.8, 0.4))
     lit.sun.parent = parent
     parent.scale = (1.5, 1.5, 1.5)
     assert_lit_from(lit, axis_of(lit.sun))
 
-    target = lit.link(None, location=(-2.0, 3.0, -1.5))
+    target = lit.rig.link(None, location=(-2.0, 3.0, -1.5))
     constraint = lit.sun.constraints.new("TRACK_TO")
     constraint.target, constraint.track_axis, constraint.up_axis = (
         target,
@@ -67,7 +77,7 @@ def test_rotated_parented_constrained_and_scaled(lit: Rig) -> None:
     assert_lit_from(lit, direction)
 
 
-def test_animated_energy_and_rotation_and_visibility(lit: Rig) -> None:
+def test_animated_energy_and_rotation_and_visibility(lit: Lit) -> None:
     for frame, angle, energy, hidden in ((1, 0.4, 1.0, False), (11, 1.4, 2.0, True)):
         lit.sun.rotation_euler = (angle, 0.0, 0.3)
         lit.sun.data.energy = energy * math.pi
@@ -75,21 +85,21 @@ def test_animated_energy_and_rotation_and_visibility(lit: Rig) -> None:
         lit.sun.keyframe_insert("rotation_euler", frame=frame)
         lit.sun.data.keyframe_insert("energy", frame=frame)
         lit.sun.keyframe_insert("hide_render", frame=frame)
-    lit.scene.frame_set(6)
+    lit.rig.scene.frame_set(6)
     assert 1.2 < lit.sun.data.energy / math.pi < 1.8
     assert_lit_from(lit, axis_of(lit.sun), lit.sun.data.energy / math.pi)
-    lit.scene.frame_set(11)
-    assert lit.render()[lit.covered].max(axis=0)[0] == 0.0  # its hidden frame is black
+    lit.rig.scene.frame_set(11)
+    assert lit.rig.render()[lit.covered].max(axis=0)[0] == 0.0  # its hidden frame is black
 
 
-def test_keyframed_sigma0_plays(lit: Rig) -> None:
+def test_keyframed_sigma0_plays(lit: Lit) -> None:
     node = cdrf_node(lit.ball)
     for frame, value in ((1, 0.0), (3, 2.0 * SIGMA)):
         node.inputs["Sigma0"].default_value = value
         node.inputs["Sigma0"].keyframe_insert("default_value", frame=frame)
     curves = lit.ball.data.materials[0].node_tree.animation_data.action
     assert curves is not None
-    lit.scene.frame_set(2)
+    lit.rig.scene.frame_set(2)
     assert abs(node.inputs["Sigma0"].default_value - SIGMA) < 1e-6
     assert_lit_from(lit, axis_of(lit.sun))
 
@@ -129,9 +139,9 @@ RENDER_ELSEWHERE = textwrap.dedent(
 
 
 @pytest.mark.smoke
-def test_file_renders_right_without_the_extension(lit: Rig, tmp_path: Path) -> None:
+def test_file_renders_right_without_the_extension(lit: Lit, tmp_path: Path) -> None:
     """Saved, opened in a Blender that has never heard of CDRF, a light turned there, rendered."""
-    mover = lit.link(None, rotation=(0.5, 0.5, 0.5))
+    mover = lit.rig.link(None, rotation=(0.5, 0.5, 0.5))
     mover.name = "Mover"
     lit.sun.rotation_euler = (1.1, 0.0, 0.6)
     lit.sun.parent = mover
@@ -155,10 +165,10 @@ def test_file_renders_right_without_the_extension(lit: Rig, tmp_path: Path) -> N
     assert np.abs(error).max() <= WRITTEN.worst
 
 
-def test_appended_material_brings_its_lights(lit: Rig, tmp_path: Path) -> None:
+def test_appended_material_brings_its_lights(lit: Lit, tmp_path: Path) -> None:
     lit.sun.rotation_euler = (1.0, 0.0, 0.5)
     direction = axis_of(lit.sun)
-    here = lit.render()
+    here = lit.rig.render()
     file = tmp_path / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=True)
     fresh = Rig()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import bpy
 import numpy as np
@@ -76,9 +77,9 @@ def test_sigma_is_sigma0_over_the_radius(rig: Rig) -> None:
     assert_within(rig.render()[covered][:, 0] - reflectance(theta, 0.5), WRITTEN, "sigma 0.5")
 
 
-LOCAL = {"location": (1.5, -3.0, 2.0)}
+LOCAL: dict[str, Any] = {"location": (1.5, -3.0, 2.0)}
 AIMED = {**LOCAL, "rotation": (math.radians(59.2), 0.0, math.radians(26.6))}
-LIGHTS = {
+LIGHTS: dict[str, dict[str, Any]] = {
     "SUN": {"energy": 1.0, "angle": 0.0, "rotation": FROM_THE_SIDE},
     "POINT": {"energy": 100.0, **LOCAL},
     "SPOT": {"energy": 100.0, "spot_size": 1.6, "spot_blend": 0.5, **AIMED},

@@ -101,7 +101,9 @@ class Rig:
         kept = item.data.materials[0] if item.data.materials else None
         parts = []
         for operation in ("FLOOR", "FRACTION"):
-            material = kept.copy() if socket == "Shader" else bpy.data.materials.new("Probe")
+            material = (
+                kept.copy() if kept and socket == "Shader" else bpy.data.materials.new("Probe")
+            )
             tree = compat.ensure_node_tree(material)
             source = _source(tree, socket)
             scale = SPLIT / (high - low)
