@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Error against run time: writes docs/benchmarks.md and docs/benchmarks.json.
+
+    ./dev python tests/benchmarks/run.py            everything, about ten minutes on two cores
+    ./dev python tests/benchmarks/run.py --only lut curvature setup frame
+
+Timings are CPU seconds of this process. Frame costs are interleaved and given as ratios, as those
+of a software rasteriser mean little by themselves.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
+
+import bpy  # noqa: E402  (the checkout must be importable first)
+import numpy as np  # noqa: E402
+from rig import Rig, cdrf_node, diffuse_material  # noqa: E402
+from surfaces import SURFACES, Surface  # noqa: E402
+
+from cdrf_addon import register, unregister  # noqa: E402
+from cdrf_addon.compat import ensure_node_tree  # noqa: E402
+from cdrf_addon.core.curvature import principal_curvatures  # noqa: E402
+from cdrf_addon.core.lut import LutLayout, build_lut, sample_lut  # noqa: E402
+from cdrf_addon.core.mesh import TriMesh  # noqa: E402
+from cdrf_addon.core.reflectance import reflectance  # noqa: E402
+
+SEED = 20111106
+ROUNDS = 5
+Rows = list[list[Any]]
+
+
+def seconds_of(call: Callable[[], Any], repeat: int = 3) -> float:
+    """Least CPU time of a few runs."""
+    times = []
+    for _ in range(repeat):
+        start = time.process_time()
+        call()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def bench_lut() -> tuple[str, list[str], Rows]:
+    """Size and storage of the table against its error, with the shader's mapping and filter."""
+    rng = np.random.default_rng(SEED)
+    count = 200_000
+    near = np.sign(rng.uniform(-1, 1, count)) * 10 ** rng.uniform(-7, 0, count)
+    cosine = np.concatenate((rng.uniform(-1, 1, count), near))
+    sigma = np.concatenate((10 ** rng.uniform(-4, 1.5, count), rng.uniform(0, 3, count)))
+    exact = reflectance(np.arccos(cosine), sigma)
+    rows: Rows = []
+    for width, height in ((64, 32), (128, 64), (256, 128), (512, 256), (1024, 512)):
+        layout = LutLayout(width, height)
+        table = build_lut(layout)
+        spent = seconds_of(partial(build_lut, layout))
+        for storage in ("float", "half"):
+            stored = table if storage == "float" else table.astype(np.float16).astype(np.float32)
+            error = np.abs(sample_lut(stored, cosine, sigma**2, layout) - exact)
+            size = width * height * 4 * (4 if storage == "float" else 2) / 1024
+            rms = float(np.sqrt((error**2).mean()))
+            chosen = "**chosen**" if (width, storage) == (256, "float") else ""
+            row = [f"{width} x {height}", storage, f"{error.max():.1e}", f"{rms:.1e}"]
+            rows.append([*row, f"{spent * 1e3:.0f}", f"{size:.0f}", chosen])
+    return (
+        "Look-up table: size and storage against error",
+        ["texels", "storage", "worst error", "RMS error", "CPU ms to make", "KiB", ""],
+        rows,
+    )
+
+
+def bench_curvature() -> tuple[str, list[str], Rows]:
+    """Error and time of the curvature estimate on analytic surfaces."""
+    rows: Rows = []
+    for name, make in SURFACES.items():
+        for wanted in (1_000, 10_000, 100_000):
+            surface: Surface = make(wanted)
+            mesh = TriMesh.from_arrays(surface.vertices, surface.triangles)
+            for radius in (2, 3):
+                start = time.process_time()
+                found = principal_curvatures(mesh, radius)
+                spent = time.process_time() - start
+                scale = math.sqrt(float((surface.kappa**2).mean()))
+                inner = surface.inner
+                error = np.abs(found.kappa - surface.kappa)[inner] / scale
+                mean = np.abs(found.mean - surface.mean)[inner] / scale
+                row = [name, f"{len(mesh.vertices):,}", radius, f"{spent:.2f}"]
+                row += [f"{100 * math.sqrt((e**2).mean()):.3f}" for e in (error, mean)]
+                rows.append([*row, f"{100 * error.max():.2f}"])
+    return (
+        "Curvature: error in % of the surface's RMS curvature, against CPU seconds",
+        ["surface", "vertices", "rings", "CPU s", "kappa RMS", "mean RMS", "kappa worst"],
+        rows,
+    )
+
+
+def bench_setup() -> tuple[str, list[str], Rows]:
+    """The whole of Make Translucent, and of pressing it again with nothing changed."""
+    rows: Rows = []
+    for wanted in (10_000, 100_000, 500_000):
+        rig = Rig()
+        rig.light("SUN")
+        surface = SURFACES["torus"](wanted)
+        mesh = bpy.data.meshes.new("Torus")
+        mesh.from_pydata(surface.vertices, [], surface.triangles)
+        item = rig.link(mesh)
+        item.select_set(True)
+        bpy.context.view_layer.update()
+        start = time.perf_counter()
+        bpy.ops.cdrf.setup()
+        first = time.perf_counter() - start
+        start = time.perf_counter()
+        bpy.ops.cdrf.setup()
+        again = time.perf_counter() - start
+        rows.append([f"{len(item.data.vertices):,}", f"{first:.2f}", f"{again:.3f}"])
+    return (
+        "Make Translucent: seconds from click to finish",
+        ["vertices", "first time, s", "again, nothing changed, s"],
+        rows,
+    )
+
+
+def _contenders(rig: Rig) -> dict[str, Callable[[], None]]:
+    """Materials and lights to be timed; each call prepares the scene for one."""
+    item = rig.sphere(subdivisions=6)
+    item.scale = (1.0, 1.0, 1.001)  # not quite a sphere: the shader reads the attribute
+    suns = [
+        rig.light("SUN", name=f"Sun {i}", energy=1.0, rotation=(0.6 + 0.2 * i, 0.0, 1.5 * i))
+        for i in range(4)
+    ]
+    emission = bpy.data.materials.new("Emission")
+    tree = ensure_node_tree(emission)
+    tree.nodes.clear()
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    glow = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(glow.outputs["Emission"], output.inputs["Surface"])
+    skin = bpy.data.materials.new("Skin")
+    subsurface = bpy.data.materials.new("Subsurface")
+    principled = next(
+        node for node in ensure_node_tree(subsurface).nodes if node.type == "BSDF_PRINCIPLED"
+    )
+    principled.inputs["Subsurface Weight"].default_value = 1.0
+    diffuse = diffuse_material()
+
+    def scene(material: bpy.types.Material, lights: int, ratio: tuple[float, ...] = ()) -> None:
+        for number, sun in enumerate(suns):
+            sun.hide_render = number >= lights
+        item.data.materials.clear()
+        item.data.materials.append(material)
+        bpy.context.view_layer.update()
+        if ratio:
+            bpy.ops.cdrf.setup()
+            material.cdrf.sigma0 = 0.2
+            material.cdrf.sigma0_ratio = ratio
+            assert cdrf_node(item) is not None
+
+    grey, skin_ratio = (1.0, 1.0, 1.0), (1.0, 0.35, 0.2)
+    return {
+        "Emission": lambda: scene(emission, 1),
+        "Diffuse BSDF, 1 sun": lambda: scene(diffuse, 1),
+        "CDRF, 1 sun, 1 look-up": lambda: scene(skin, 1, grey),
+        "CDRF, 1 sun, 3 look-ups": lambda: scene(skin, 1, skin_ratio),
+        "Diffuse BSDF, 4 suns": lambda: scene(diffuse, 4),
+        "CDRF, 4 suns, 3 look-ups": lambda: scene(skin, 4, skin_ratio),
+        "Principled with subsurface, 1 sun": lambda: scene(subsurface, 1),
+    }
+
+
+def bench_frame() -> tuple[str, list[str], Rows]:
+    """CPU time of a frame, interleaved, as a ratio to the Diffuse BSDF under one sun."""
+    rig = Rig()
+    contenders = _contenders(rig)
+    rig.scene.render.resolution_x = rig.scene.render.resolution_y = 512
+    rig.scene.eevee.taa_render_samples = 8
+    rig.scene.render.film_transparent = False
+    times: dict[str, list[float]] = {name: [] for name in contenders}
+    first: dict[str, float] = {}
+    for turn in range(ROUNDS + 1):
+        for name, prepare in contenders.items():
+            prepare()
+            start = time.process_time()
+            rig.render()
+            spent = time.process_time() - start
+            if turn:
+                times[name].append(spent)
+            else:
+                first[name] = spent  # with the shader's compilation
+    base = np.array(times["Diffuse BSDF, 1 sun"])
+    rows: Rows = []
+    for name, spent_each in times.items():
+        ratio = np.array(spent_each) / base
+        low, middle, high = np.percentile(ratio, (10, 50, 90))
+        compile_time = first[name] - float(np.median(spent_each))
+        row = [name, f"{middle:.2f}", f"{low:.2f} to {high:.2f}", f"{np.median(spent_each):.2f}"]
+        rows.append([*row, f"{compile_time:.1f}"])
+    return (
+        f"A frame of 512 x 512, 8 samples: CPU time against the Diffuse BSDF ({ROUNDS} rounds)",
+        ["material", "ratio, median", "10 % to 90 %", "CPU s", "first frame, CPU s more"],
+        rows,
+    )
+
+
+BENCHES = {
+    "lut": bench_lut,
+    "curvature": bench_curvature,
+    "setup": bench_setup,
+    "frame": bench_frame,
+}
+
+
+def machine() -> dict[str, str]:
+    """Name what the numbers were measured on."""
+    packages = {name: version(name) for name in ("numpy", "scipy", "libigl")}
+    return {
+        "date": time.strftime("%Y-%m-%d"),
+        "cores": str(os.cpu_count()),
+        "architecture": platform.machine(),
+        "python": platform.python_version(),
+        "blender": bpy.app.version_string,
+        **packages,
+    }
+
+
+def to_markdown(results: dict[str, Any]) -> str:
+    """Render all tables as one page."""
+    facts = ", ".join(f"{name} {value}" for name, value in results["machine"].items())
+    lines = ["# Benchmarks", "", "Generated by `tests/benchmarks/run.py`; do not edit.", ""]
+    lines += [f"Measured on: {facts}; EEVEE on a software rasteriser.", ""]
+    for name in BENCHES:
+        if name in results:
+            title, head, rows = results[name]
+            lines += [f"## {title}", "", "| " + " | ".join(head) + " |"]
+            lines += ["|" + "---|" * len(head)]
+            lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows] + [""]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run the chosen benches; results of the others stay as they are in the JSON file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="+", choices=BENCHES, default=list(BENCHES))
+    chosen = parser.parse_args().only
+    data = ROOT / "docs" / "benchmarks.json"
+    results = json.loads(data.read_text()) if data.exists() else {}
+    results["machine"] = machine()
+    register()
+    try:
+        for name in chosen:
+            print(f"{name} ...", flush=True)
+            results[name] = BENCHES[name]()
+    finally:
+        unregister()
+    data.write_text(json.dumps(results, indent=1) + "\n")
+    (ROOT / "docs" / "benchmarks.md").write_text(to_markdown(results))
+
+
+if __name__ == "__main__":
+    main()
