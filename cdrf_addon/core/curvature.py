@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import DependencyError, ParameterError
-from .mesh import CleaningReport, CleanMesh, TriMesh, clean
+from .mesh import CleaningReport, CleanMesh, Result, TriMesh, clean_steps, run_steps
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -78,13 +78,7 @@ class CurvatureField:
 
 def principal_curvatures(mesh: TriMesh, radius: int = DEFAULT_RADIUS) -> CurvatureField:
     """Estimate the principal curvatures in one go; see `curvature_steps`."""
-    steps = curvature_steps(mesh, radius)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            result: CurvatureField = done.value
-            return result
+    return run_steps(curvature_steps(mesh, radius))
 
 
 def curvature_steps(mesh: TriMesh, radius: int = DEFAULT_RADIUS) -> Steps:
@@ -108,16 +102,14 @@ def curvature_steps(mesh: TriMesh, radius: int = DEFAULT_RADIUS) -> Steps:
     if not 2 <= radius <= 10:
         raise ParameterError(f"The fit takes 2 to 10 rings of neighbours, not {radius}.")
     yield 0.0
-    cleaned = clean(mesh)
-    yield 0.05
-    triangles = _guard(cleaned, radius)
-    yield 0.1
+    cleaned = yield from _paced(clean_steps(mesh), 0.0, 0.03)
+    triangles = yield from _paced(_guard_steps(cleaned, radius), 0.2, 0.02)
     count = len(cleaned.vertices)
     k1, k2 = np.zeros(count), np.zeros(count)
     good = np.zeros(count, dtype=bool)
     for part, done in _chunks(cleaned.vertices, triangles, radius):
         k1[part.rows], k2[part.rows], good[part.rows] = _fit(part, radius)
-        yield 0.1 + 0.85 * done
+        yield 0.3 + 0.65 * done
     _fill(cleaned, k1, k2, good)
 
     belongs = cleaned.source >= 0
@@ -154,7 +146,21 @@ def _adjacency(triangles: Indices, count: int) -> Any:
     return matrix
 
 
-def _guard(cleaned: CleanMesh, radius: int) -> Indices:
+def _paced(
+    steps: Generator[None, None, Result], start: float, pace: float
+) -> Generator[float, None, Result]:
+    """Turn pauses into progress: `pace` for each, from `start` to 0.3 at the most."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            result: Result = done.value
+            return result
+        start += pace
+        yield min(start, 0.3)
+
+
+def _guard_steps(cleaned: CleanMesh, radius: int) -> Generator[None, None, Indices]:
     """Drop the faces around vertices that join too many edges or whose neighbourhood has no normal.
 
     libigl divides by the length of that normal; the NaN it gets crashes its SVD, or comes out as
@@ -175,8 +181,10 @@ def _guard(cleaned: CleanMesh, radius: int) -> Indices:
         used = size > 0.0
         bad = used & (length <= NORMAL_LIMIT * size)
         unit = at_vertex / np.where(length > 0.0, length, 1.0)[:, None]
+        yield
         ring, weight = unit, used.astype(np.float64)
         adjacency = _adjacency(triangles, count)
+        yield
         for _ring in range(radius):
             ring, weight = ring + adjacency @ ring, weight + adjacency @ weight
         bad |= used & (np.linalg.norm(ring, axis=1) <= NORMAL_LIMIT * weight)

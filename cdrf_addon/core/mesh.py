@@ -8,8 +8,9 @@ happen, says what it left out, and keeps the way back to the artist's vertices.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
     Points = NDArray[np.float64]
     Indices = NDArray[np.int64]
+
+Result = TypeVar("Result")
 
 # A triangle flatter than this (height / longest edge) has no usable normal in float32 coordinates.
 FLATNESS_LIMIT = 1e-6
@@ -106,7 +109,22 @@ class CleanMesh:
 
 
 def clean(mesh: TriMesh) -> CleanMesh:
-    """Weld, filter, orient and normalise a mesh.
+    """Weld, filter, orient and normalise a mesh in one go; see `clean_steps`."""
+    return run_steps(clean_steps(mesh))
+
+
+def run_steps(steps: Generator[Any, None, Result]) -> Result:
+    """Run a generator of steps to its end and return its result."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            result: Result = done.value
+            return result
+
+
+def clean_steps(mesh: TriMesh) -> Generator[None, None, CleanMesh]:
+    """Weld, filter, orient and normalise a mesh, pausing between the parts of the work.
 
     Args:
         mesh: Any mesh; unchanged.
@@ -124,12 +142,17 @@ def clean(mesh: TriMesh) -> CleanMesh:
         raise MeshError("The mesh has no faces, only loose vertices or edges; fill faces first.")
     vertices, triangles = _drop_non_finite(mesh, report)
     vertices, edge = _normalise(vertices, triangles)
+    yield
     triangles = _drop_stray(vertices, triangles, report)
+    yield
     welded, first = weld(vertices)
+    yield
     report.welded_vertices = int(len(vertices) - len(first))
     vertices, triangles = vertices[first], welded[triangles]
     triangles = _drop_degenerate(vertices, triangles, report)
+    yield
     triangles = _drop_duplicates(triangles, report)
+    yield
     if not len(triangles):
         raise MeshError(
             "No face of the mesh can be used ("
@@ -137,6 +160,7 @@ def clean(mesh: TriMesh) -> CleanMesh:
             + ") Clean it up with Mesh > Clean Up or Merge by Distance."
         )
     triangles = _orient(triangles, report)
+    yield
     used = np.zeros(len(vertices), dtype=bool)
     used[triangles] = True
     compact = np.where(used, np.cumsum(used) - 1, -1)
