@@ -42,7 +42,7 @@ DEMO_MESH = Path(__file__).resolve().parents[1] / "tests" / "data" / "human_head
 DEMO = {
     "scale": 0.1,
     "subdivide": 2,
-    "sigma0": [0.004],
+    "sigma0": [0.003],
     "ratio": [1.0, 0.35, 0.2],
     "albedo": [0.8, 0.56, 0.45],
     "resolution": (480, 640),

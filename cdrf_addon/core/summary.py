@@ -29,7 +29,7 @@ class CurvatureSummary:
     """5th percentile of kappa."""
     median: float
     high: float
-    """99th percentile of kappa; the maximum of a real mesh is a crease and says little."""
+    """95th percentile of kappa; the maximum of a real mesh is a crease and says little."""
     mean_values: tuple[float, float, float, float]
     """Means of kappa, k1, k2 and signed mean curvature."""
 
@@ -40,7 +40,7 @@ def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
     used[mesh.triangles] = True
     used &= np.isfinite(mesh.vertices).all(axis=1)
     kappa = field.kappa[used]
-    low, median, high = np.percentile(kappa, (5.0, 50.0, 99.0))
+    low, median, high = np.percentile(kappa, (5.0, 50.0, 95.0))
     means = tuple(
         float(values[used].mean()) for values in (field.kappa, field.k1, field.k2, field.mean)
     )

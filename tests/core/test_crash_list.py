@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from cdrf_addon.core.curvature import principal_curvatures
 from cdrf_addon.core.errors import CdrfError
@@ -29,7 +30,7 @@ SECONDS = 20.0
 # Where most of the mesh is a good unit sphere of 32 x 16: the median kappa is high by 3 % there.
 SPHERE = (0.97, 1.06)
 
-Arrays = tuple[object, object]
+Arrays = tuple[ArrayLike, ArrayLike]
 CASES: dict[str, tuple[Callable[[], Arrays], str | tuple[float, float]]] = {}
 
 
@@ -75,7 +76,7 @@ def before(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.vstack((vertices, good)), np.vstack((faces, sides + len(vertices)))
 
 
-def with_first(position: object) -> tuple[np.ndarray, np.ndarray]:
+def with_first(position: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """A ball whose first vertex is somewhere else."""
     vertices, faces = ball()
     vertices[0] = position

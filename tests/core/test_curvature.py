@@ -15,6 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from cdrf_addon.core import curvature
 from cdrf_addon.core.curvature import CurvatureField, curvature_steps, principal_curvatures
@@ -96,7 +97,7 @@ def cone(segments: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
     return np.vstack(((0.0, 0.0, 1.0), body)), np.vstack((tip, faces))
 
 
-def estimate(vertices: object, faces: object, radius: int = 2) -> CurvatureField:
+def estimate(vertices: ArrayLike, faces: ArrayLike, radius: int = 2) -> CurvatureField:
     """Estimate, and hold what holds for every mesh."""
     mesh = TriMesh.from_arrays(vertices, faces)
     result = principal_curvatures(mesh, radius)

@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from cdrf_addon.core.errors import MeshError
 from cdrf_addon.core.mesh import EDGE_LIMIT, CleanMesh, TriMesh, clean, edge_lengths, weld
@@ -104,7 +105,7 @@ def windings(faces: np.ndarray) -> np.ndarray:
     return turned[np.lexsort(turned.T)]
 
 
-def cleaned(vertices: object, faces: object) -> CleanMesh:
+def cleaned(vertices: ArrayLike, faces: ArrayLike) -> CleanMesh:
     """Clean plain arrays, and hold what holds for every clean mesh."""
     mesh = TriMesh.from_arrays(vertices, faces)
     before = mesh.vertices.copy(), mesh.triangles.copy()
@@ -379,7 +380,7 @@ NO_POINTS, NO_FACES = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     ],
 )
 def test_what_cannot_be_used_is_refused_in_a_sentence(
-    vertices: object, faces: object, words: str
+    vertices: ArrayLike, faces: ArrayLike, words: str
 ) -> None:
     with pytest.raises(MeshError) as refusal:
         clean(TriMesh.from_arrays(vertices, faces))
