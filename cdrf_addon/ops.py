@@ -10,7 +10,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from . import ids
-from .blender import materials, state
+from .blender import display, materials, state
 from .blender.mesh_io import remove_curvature
 from .blender.setup import (
     Report,
@@ -20,7 +20,6 @@ from .blender.setup import (
 )
 from .core.curvature import DEFAULT_RADIUS
 from .core.errors import CdrfError
-from .props import CdrfMesh
 
 # Meshes up to this size are done in under half a second; above it a progress bar comes up.
 MODAL_FROM_VERTICES = 15_000
@@ -203,6 +202,7 @@ class CDRF_OT_remove(bpy.types.Operator):
             return {"CANCELLED"}
         users = [item for item in context.scene.objects if chosen & set(_skins(item))]
         for material in chosen:
+            display.show_skin(material)
             materials.remove(material)
         for item in users:
             if not _skins(item) and item.data.is_editable:
@@ -242,17 +242,17 @@ class CDRF_OT_show_curvature(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = translucent_objects(context.view_layer)
-        skins: dict[bpy.types.Material, list[CdrfMesh]] = {}
+        skins: dict[bpy.types.Material, list[bpy.types.Mesh]] = {}
         for item in objects:
             for skin in _skins(item):
-                skins.setdefault(skin, []).append(item.data.cdrf)
-        showing = any(materials.shows_curvature(skin) for skin in skins)
+                skins.setdefault(skin, []).append(item.data)
+        showing = any(display.shows_curvature(skin) for skin in skins)
         on = not showing if self.display == "TOGGLE" else self.display == "ON"
-        for skin, known in skins.items():
-            low = min(mesh.low for mesh in known)
-            high = max(mesh.high for mesh in known)
-            wanted = materials.DisplayRange(low, max(high, low * 1.001, 1e-6)) if on else None
-            materials.show_curvature(skin, wanted)
+        for skin, meshes in skins.items():
+            if on:
+                display.show_curvature(skin, meshes)
+            else:
+                display.show_skin(skin)
         space = context.space_data
         if on and space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
             self.report({"INFO"}, "Switch the viewport to Rendered (Z) to see the curvature")

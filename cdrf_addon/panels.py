@@ -8,7 +8,7 @@ import textwrap
 import bpy
 
 from . import ids
-from .blender import materials, shader, state
+from .blender import display, materials, shader, state
 from .compat import EEVEE
 from .core.summary import CONSTANT, FLAT
 
@@ -122,7 +122,7 @@ class CDRF_PT_main(_View3D, bpy.types.Panel):
         layout.label(text=skin.name, icon="MATERIAL")
         draw_skin(layout, context, skin)
         row = layout.row(align=True)
-        shown = materials.shows_curvature(skin)
+        shown = display.shows_curvature(skin)
         row.operator(
             "cdrf.show_curvature",
             text="Show Skin" if shown else "Show Curvature",

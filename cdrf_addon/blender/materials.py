@@ -7,7 +7,6 @@ and output stay, so Cycles renders them as before, and removing our two nodes re
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -15,9 +14,8 @@ import bpy
 from .. import ids
 from ..compat import ensure_node_tree, set_uses_nodes, uses_nodes
 from ..core.errors import SceneError
-from .groups import display_group
 from .nodetree import TreeBuilder
-from .shader import ATTRIBUTE, CONSTANT, SCALED, curvature_nodes, is_shader_group, stamped_variant
+from .shader import is_shader_group
 
 COLOUR_INPUTS = ("Base Color", "Color")
 PLAIN_KEY = "cdrf_was_plain"
@@ -146,7 +144,6 @@ def remove(material: bpy.types.Material) -> bool:
     node = cdrf_node(material)
     if node is None:
         return False
-    show_curvature(material, None)
     tree = material.node_tree
     output = tree.nodes.get(ids.OUTPUT_NODE)
     if output is not None:
@@ -159,57 +156,3 @@ def remove(material: bpy.types.Material) -> bool:
         del material[PLAIN_KEY]
         set_uses_nodes(material, False)
     return True
-
-
-@dataclass(frozen=True)
-class DisplayRange:
-    """Curvature shown as black and as white, per world unit."""
-
-    low: float
-    high: float
-
-
-def shows_curvature(material: bpy.types.Material) -> bool:
-    """Tell whether the material shows its curvature in hot colours just now."""
-    tree = material.node_tree
-    return tree is not None and ids.DISPLAY_NODE in tree.nodes
-
-
-def show_curvature(material: bpy.types.Material, wanted: DisplayRange | None) -> None:
-    """Show the curvature in hot colours (paper, Fig. 3a); None brings the skin back."""
-    node = cdrf_node(material)
-    tree = material.node_tree
-    output = tree.nodes.get(ids.OUTPUT_NODE) if tree else None
-    if node is None or output is None:
-        return
-    for name in (ids.DISPLAY_NODE, *_HELPERS):
-        if name in tree.nodes:
-            tree.nodes.remove(tree.nodes[name])
-    builder = TreeBuilder(tree)
-    if wanted is None:
-        builder.feed(output.inputs["Surface"], node.outputs[ids.SHADER])
-        return
-    before = {item.name for item in tree.nodes}
-    source = stamped_variant(node.node_tree).source
-    curvature: Any = 0.0
-    if source in {ATTRIBUTE, SCALED}:
-        curvature = curvature_nodes(builder, scaled=source == SCALED)
-    elif source == CONSTANT:
-        curvature = node.inputs[ids.CURVATURE].default_value
-    helpers = [item for item in tree.nodes if item.name not in before]
-    for helper, name in zip(helpers, _HELPERS, strict=False):
-        helper.name = name
-    shown = builder.group(
-        display_group(),
-        ids.DISPLAY_NODE,
-        Curvature=curvature,
-        Minimum=wanted.low,
-        Maximum=wanted.high,
-    )
-    shown.location = (node.location[0], node.location[1] + 260.0)
-    for column, helper in enumerate(helpers):
-        helper.location = (shown.location[0] - 600.0 + 190.0 * column, shown.location[1])
-    builder.feed(output.inputs["Surface"], shown.outputs[ids.SHADER])
-
-
-_HELPERS = tuple(f"{ids.DISPLAY_NODE} {part}" for part in ("Attribute", "Parts", "Size", "Product"))

@@ -21,7 +21,7 @@ from ..core.curvature import DEFAULT_RADIUS, curvature_steps
 from ..core.errors import CdrfError, SceneError
 from ..core.sphere import sphere_curvature
 from ..core.summary import CONSTANT, FLAT, CurvatureSummary, summarise
-from . import shader, state
+from . import display, shader, state
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
 from .mesh_io import (
@@ -328,6 +328,8 @@ class Setup:
         if source == shader.CONSTANT:
             kappas = [item.mean_values[0] for item in work]
             node.inputs[ids.CURVATURE].default_value = float(np.mean(kappas))
+        if display.shows_curvature(material):
+            display.show_curvature(material, [item.mesh for item in work])
 
     def _sum_up(self, lights: list[SceneLight], sources: dict[bpy.types.Material, str]) -> None:
         report = self.report

@@ -381,3 +381,23 @@ def test_render_slots_and_object_slots(rig: Rig) -> None:
     assert eye.node_tree is None or ids.NODE not in eye.node_tree.nodes
     bpy.ops.cdrf.setup()
     assert ids.NODE in eye.node_tree.nodes
+
+
+def test_curvature_display_follows_an_update_and_goes_away(rig: Rig) -> None:
+    item = rig.sphere()
+    bpy.ops.cdrf.setup()
+    tree = item.data.materials[0].node_tree
+    before = {node.name for node in tree.nodes}
+    bpy.ops.cdrf.show_curvature(display="ON")
+    assert tree.nodes[ids.DISPLAY_NODE].inputs["Curvature"].default_value == pytest.approx(1.0)
+    # No sphere any more: the display reads the attribute from now on.
+    item.data.vertices[0].co *= 1.5
+    item.data.update()
+    bpy.ops.cdrf.update()
+    shown = tree.nodes[ids.DISPLAY_NODE]
+    assert shown.inputs["Curvature"].is_linked
+    assert shown.inputs["Maximum"].default_value == pytest.approx(item.data.cdrf.high)
+    bpy.ops.cdrf.show_curvature(display="OFF")
+    assert {node.name for node in tree.nodes} == before
+    surface = tree.nodes[ids.OUTPUT_NODE].inputs["Surface"]
+    assert surface.links[0].from_node.name == ids.NODE
