@@ -170,17 +170,12 @@ def _guard_steps(cleaned: CleanMesh, radius: int) -> Generator[None, None, Indic
     count = len(cleaned.vertices)
     hub = np.bincount(triangles.ravel(), minlength=count) > VALENCE_LIMIT
     cleaned.report.hub_vertices = int(hub.sum())
+    hub |= cleaned.seam
     if hub.any():
         triangles = triangles[~hub[triangles].any(axis=1)]
     for _ in range(GUARD_ROUNDS):
-        corners = cleaned.vertices[triangles]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        at_vertex = np.stack([_scatter(triangles, normal[:, axis], count) for axis in range(3)], 1)
-        size = _scatter(triangles, np.linalg.norm(normal, axis=1), count)
-        length = np.linalg.norm(at_vertex, axis=1)
-        used = size > 0.0
-        bad = used & (length <= NORMAL_LIMIT * size)
-        unit = at_vertex / np.where(length > 0.0, length, 1.0)[:, None]
+        unit, used, sound = _vertex_normals(cleaned.vertices, triangles)
+        bad = used & ~sound
         yield
         ring, weight = unit, used.astype(np.float64)
         adjacency = _adjacency(triangles, count)
@@ -194,6 +189,20 @@ def _guard_steps(cleaned: CleanMesh, radius: int) -> Generator[None, None, Indic
         if not len(triangles):
             break
     return triangles[:0]
+
+
+def _vertex_normals(
+    vertices: Points, triangles: Indices
+) -> tuple[Points, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Area-weighted vertex normals; which vertices have faces, and which a normal to speak of."""
+    corners = vertices[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    count = len(vertices)
+    total = np.stack([_scatter(triangles, normal[:, axis], count) for axis in range(3)], 1)
+    size = _scatter(triangles, np.linalg.norm(normal, axis=1), count)
+    length = np.linalg.norm(total, axis=1)
+    sound = length > NORMAL_LIMIT * size
+    return total / np.where(sound, length, 1.0)[:, None], size > 0.0, sound
 
 
 def _scatter(triangles: Indices, per_face: Points, count: int) -> Points:
@@ -316,8 +325,8 @@ def _sentinel() -> tuple[Points, Indices]:
 def _fill(cleaned: CleanMesh, k1: Points, k2: Points, good: NDArray[np.bool_]) -> None:
     """Give vertices without a fit the mean of their neighbours, ring by ring, in place.
 
-    Pieces without a single fit (a cube's eight vertices, a lone tetrahedron) are too small for a
-    quadric; there the turn of the normals along the edges stands in.
+    Pieces without a single fit (a lone tetrahedron) are too small for a quadric; there the turn of
+    the normals along the edges stands in.
     """
     if good.all():
         return
@@ -339,18 +348,15 @@ def _fill(cleaned: CleanMesh, k1: Points, k2: Points, good: NDArray[np.bool_]) -
 
 def _turn_of_normals(cleaned: CleanMesh, adjacency: Any) -> Points:
     """Mean of |dN| / |dP| over the edges at each vertex, signed: positive where normals diverge."""
-    vertices, triangles = cleaned.vertices, cleaned.triangles
-    corners = vertices[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    vertices = cleaned.vertices
     count = len(vertices)
-    at_vertex = np.stack([_scatter(triangles, normal[:, axis], count) for axis in range(3)], 1)
-    length = np.linalg.norm(at_vertex, axis=1, keepdims=True)
-    unit = at_vertex / np.where(length > 0.0, length, 1.0)
+    unit, _, sound = _vertex_normals(vertices, cleaned.triangles)
     start, end = adjacency.nonzero()
     along, turned = vertices[end] - vertices[start], unit[end] - unit[start]
     distance = np.maximum(np.linalg.norm(along, axis=1), np.finfo(np.float64).tiny)
     bend = np.linalg.norm(turned, axis=1) / distance
     bend *= np.where((along * turned).sum(axis=1) < 0.0, -1.0, 1.0)
+    bend[~(sound[start] & sound[end])] = 0.0  # opposite sheets cancel: no normal, no turn
     edges = np.bincount(start, minlength=count)
     total = np.bincount(start, np.minimum(bend, CURVATURE_LIMIT), minlength=count)
     return np.asarray(total / np.maximum(edges, 1))

@@ -105,6 +105,8 @@ class CleanMesh:
     """Median edge length in the source's unit; curvature is divided by it on the way back."""
     source: Indices
     """(N,) welded vertex of each source vertex; -1 where it belongs to no usable face."""
+    seam: NDArray[np.bool_]
+    """(n,) True where neighbouring faces cannot be wound alike (the seam of a Möbius strip)."""
     report: CleaningReport = field(default_factory=CleaningReport)
 
 
@@ -140,7 +142,8 @@ def clean_steps(mesh: TriMesh) -> Generator[None, None, CleanMesh]:
         raise MeshError("The mesh has no vertices; give it some geometry first.")
     if not len(mesh.triangles):
         raise MeshError("The mesh has no faces, only loose vertices or edges; fill faces first.")
-    vertices, triangles = _drop_non_finite(mesh, report)
+    finite = np.isfinite(mesh.vertices).all(axis=1)
+    vertices, triangles = _drop_non_finite(mesh, finite, report)
     vertices, edge = _normalise(vertices, triangles)
     yield
     triangles = _drop_stray(vertices, triangles, report)
@@ -159,16 +162,19 @@ def clean_steps(mesh: TriMesh) -> Generator[None, None, CleanMesh]:
             + (" ".join(report.sentences()) or "all of them are degenerate.")
             + ") Clean it up with Mesh > Clean Up or Merge by Distance."
         )
-    triangles = _orient(triangles, report)
+    triangles, seam = _orient(triangles, len(vertices), report)
     yield
     used = np.zeros(len(vertices), dtype=bool)
     used[triangles] = True
     compact = np.where(used, np.cumsum(used) - 1, -1)
+    source = np.full(len(mesh.vertices), -1, dtype=np.int64)
+    source[finite] = compact[welded]
     return CleanMesh(
         np.ascontiguousarray(vertices[used]),
         np.ascontiguousarray(compact[triangles]),
         edge,
-        compact[welded],
+        source,
+        seam[used],
         report,
     )
 
@@ -199,8 +205,9 @@ def weld(vertices: Points) -> tuple[Indices, Indices]:
     return rank[group].astype(np.int64), first[order].astype(np.int64)
 
 
-def _drop_non_finite(mesh: TriMesh, report: CleaningReport) -> tuple[Points, Indices]:
-    finite = np.isfinite(mesh.vertices).all(axis=1)
+def _drop_non_finite(
+    mesh: TriMesh, finite: NDArray[np.bool_], report: CleaningReport
+) -> tuple[Points, Indices]:
     report.non_finite_vertices = int((~finite).sum())
     triangles = mesh.triangles[finite[mesh.triangles].all(axis=1)]
     if not len(triangles):
@@ -208,7 +215,7 @@ def _drop_non_finite(mesh: TriMesh, report: CleaningReport) -> tuple[Points, Ind
             "Every face has a vertex at infinity or nowhere (NaN); check the modifiers and drivers "
             "that move the vertices."
         )
-    return np.where(finite[:, None], mesh.vertices, 0.0), triangles
+    return mesh.vertices[finite], (np.cumsum(finite) - 1)[triangles]
 
 
 def edge_lengths(vertices: Points, triangles: Indices) -> Points:
@@ -243,7 +250,8 @@ def _normalise(vertices: Points, triangles: Indices) -> tuple[Points, float]:
 
 
 def _drop_stray(vertices: Points, triangles: Indices, report: CleaningReport) -> Indices:
-    stray = edge_lengths(vertices, triangles).max(axis=1) > EDGE_LIMIT
+    with np.errstate(over="ignore"):  # an infinite length is as stray as any
+        stray = edge_lengths(vertices, triangles).max(axis=1) > EDGE_LIMIT
     report.stray_faces = int(stray.sum())
     return triangles[~stray]
 
@@ -268,7 +276,9 @@ def _drop_duplicates(triangles: Indices, report: CleaningReport) -> Indices:
     return triangles[~repeated]
 
 
-def _orient(triangles: Indices, report: CleaningReport) -> Indices:
+def _orient(
+    triangles: Indices, vertex_count: int, report: CleaningReport
+) -> tuple[Indices, NDArray[np.bool_]]:
     """Wind neighbouring faces alike; the larger part of each component keeps its side.
 
     Consistency is two-colouring the graph of faces: each face stands twice in it, as it is and
@@ -289,8 +299,9 @@ def _orient(triangles: Indices, report: CleaningReport) -> Indices:
     start = np.flatnonzero(np.concatenate(([True], key[1:] != key[:-1])))
     pair = start[np.diff(np.append(start, len(key))) == 2]
     one, other, alike = face[pair], face[pair + 1], forward[pair] == forward[pair + 1]
+    seam = np.zeros(vertex_count, dtype=bool)
     if not alike.any():
-        return triangles
+        return triangles, seam
 
     mirror = np.where(alike, count, 0)
     rows = np.concatenate((one, one + count))
@@ -304,4 +315,7 @@ def _orient(triangles: Indices, report: CleaningReport) -> Indices:
     flip = (kept[flipped] > kept[as_is]) | ((kept[flipped] == kept[as_is]) & (flipped < as_is))
     flip &= as_is != flipped
     report.flipped_faces = int(flip.sum())
-    return np.where(flip[:, None], triangles[:, ::-1], triangles)
+    # Edges that are still alike after that have no consistent winding at all.
+    torn = order[pair][alike ^ flip[one] ^ flip[other]]
+    seam[tail[torn]] = seam[head[torn]] = True
+    return np.where(flip[:, None], triangles[:, ::-1], triangles), seam
