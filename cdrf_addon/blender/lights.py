@@ -188,6 +188,12 @@ def drive(
     node = bpy.utils.escape_identifier(socket.node.name)
     path = f'nodes["{node}"].inputs["{socket.name}"].default_value'
     curve = tree.driver_add(path, index) if index >= 0 else tree.driver_add(path)
+    # A new driver comes with keyframes at (0, 0) and (1, 1), and Blender snaps what it computes to
+    # them within 1e-4: a narrow cone or a weak light would vanish.
+    for point in reversed(curve.keyframe_points):
+        curve.keyframe_points.remove(point)
+    for modifier in list(curve.modifiers):
+        curve.modifiers.remove(modifier)
     driver = curve.driver
     driver.type = "SCRIPTED"
     for name, where in paths.items():

@@ -24,7 +24,7 @@ from .groups import light_group, reflectance_group
 from .lights import SceneLight, drive_light
 from .nodetree import TreeBuilder, declare, rebuild
 
-VERSION = 1
+VERSION = 2
 
 FLAT, CONSTANT, ATTRIBUTE, SCALED = "flat", "constant", "attribute", "scaled attribute"
 """Where kappa comes from: nowhere, the Curvature input, the mesh, the mesh and the object."""
@@ -125,8 +125,9 @@ def wired_lights(
     targets: dict[str, bpy.types.Object | None] = {}
     if group.animation_data is not None:
         for curve in group.animation_data.drivers:
-            name = curve.data_path.split('"')[1]
-            targets[bpy.utils.unescape_identifier(name)] = curve.driver.variables[0].targets[0].id
+            escaped = curve.data_path.removeprefix('nodes["').partition('"].inputs["')[0]
+            target = curve.driver.variables[0].targets[0].id
+            targets[bpy.utils.unescape_identifier(escaped)] = target
     return [
         (targets.get(node.name), node[ids.LIGHT_KEY])
         for node in group.nodes
