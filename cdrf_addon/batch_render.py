@@ -32,11 +32,12 @@ if not __package__:  # run as a file: make the package importable, then go on in
 import bpy
 
 from cdrf_addon import compat, register, unregister
-from cdrf_addon.blender import setup, stage
+from cdrf_addon.blender import display, setup, stage
 from cdrf_addon.blender.materials import cdrf_node
 from cdrf_addon.core.errors import CdrfError, ParameterError, SceneError
 
 VERSION = 1
+JOURNAL = "pictures.tsv"
 DEMO_MESH = Path(__file__).resolve().parents[1] / "tests" / "data" / "human_head.obj"
 # The head's unit is the decimetre; skin's colours and the reach of its red, green and blue.
 DEMO = {
@@ -117,22 +118,31 @@ def parse_resolution(text: str) -> tuple[int, int]:
     return width, height
 
 
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is no number (name the input files first, options after them)"
+        ) from error
+
+
 def _distance(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not (math.isfinite(value) and 0.0 <= value <= 1e6):
         raise argparse.ArgumentTypeError(f"{text}: a distance from 0 to 1e6 is wanted")
     return value
 
 
 def _factor(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not (math.isfinite(value) and 0.0 <= value <= 1e3):
         raise argparse.ArgumentTypeError(f"{text}: a factor from 0 to 1000 is wanted")
     return value
 
 
 def _size(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not (math.isfinite(value) and 1e-9 <= value <= 1e9):
         raise argparse.ArgumentTypeError(f"{text}: a scale from 1e-9 to 1e9 is wanted")
     return value
@@ -140,10 +150,10 @@ def _size(text: str) -> float:
 
 def _count(low: int, high: int) -> Any:
     def read(text: str) -> int:
-        value = int(text)
-        if not low <= value <= high:
+        value = _number(text)
+        if value != int(value) or not low <= value <= high:
             raise argparse.ArgumentTypeError(f"{text}: a number from {low} to {high} is wanted")
-        return value
+        return int(value)
 
     return read
 
@@ -244,18 +254,30 @@ def prepare(path: Path, options: argparse.Namespace, record: SceneRecord) -> Non
     if options.samples:
         scene.eevee.taa_render_samples = options.samples
     output = scene.render.image_settings
-    output.file_format = "OPEN_EXR" if options.format == "EXR" else "PNG"
+    compat.set_still_format(output, "OPEN_EXR" if options.format == "EXR" else "PNG")
     output.color_depth = "32" if options.format == "EXR" else "8"
+    if scene.render.use_multiview:
+        record.warnings.append("The scene was set to stereo; rendered as one picture.")
+        scene.render.use_multiview = False
     with record.stage("curvature and nodes"):
-        objects = setup.translucent_objects(bpy.context.view_layer)
-        if not objects:
-            objects = [
-                item
-                for item in bpy.context.view_layer.objects
-                if item.type == "MESH" and not item.hide_render
-            ]
-            if not mesh_file:
-                record.warnings.append("Nothing was translucent yet: every mesh was set up.")
+        _make_translucent(record, mesh_file)
+    for material in translucent_materials():
+        _adjust(material, options, mesh_file, record)
+
+
+def _make_translucent(record: SceneRecord, mesh_file: bool) -> None:
+    layer = bpy.context.view_layer
+    objects = setup.translucent_objects(layer)
+    linked = sorted({m.name for item in layer.objects for m in setup.linked_skins(item)})
+    if linked:
+        record.warnings.append(
+            f"Linked, so left as in their own file, --sigma0 or not: {', '.join(linked)}."
+        )
+    if not objects and not linked:
+        objects = [item for item in layer.objects if item.type == "MESH" and not item.hide_render]
+        if not mesh_file:
+            record.warnings.append("Nothing was translucent yet: every mesh was set up.")
+    if objects or not linked:
         job = setup.Setup(bpy.context, objects)
         shown = -1
         for part, what in job.steps():
@@ -263,17 +285,41 @@ def prepare(path: Path, options: argparse.Namespace, record: SceneRecord) -> Non
                 shown = int(part * 4)
                 say(f"  {what}: {part:.0%}")
         report = job.commit()
-    record.vertices = report.vertices
-    record.warnings += report.warnings
-    for material in translucent_materials():
-        if options.ratio:
-            material.cdrf.sigma0_ratio = options.ratio
-        if options.albedo and mesh_file:
-            node = cdrf_node(material)
-            assert node is not None
-            for link in list(node.inputs["Base Color"].links):
-                material.node_tree.links.remove(link)
-            node.inputs["Base Color"].default_value = (*options.albedo, 1.0)
+        record.vertices = report.vertices
+        record.warnings += report.warnings
+
+
+def _adjust(
+    material: bpy.types.Material, options: argparse.Namespace, mesh_file: bool, record: SceneRecord
+) -> None:
+    """Set what the command line asks of a material, and take away what would override it."""
+    node = cdrf_node(material)
+    assert node is not None
+    if display.shows_curvature(material):
+        record.warnings.append(f"'{material.name}' was showing its curvature; skin is rendered.")
+        display.show_skin(material)
+    if options.ratio:
+        material.cdrf.sigma0_ratio = options.ratio
+    if options.sigma0 and _free(material, node.inputs["Sigma0"]):
+        record.warnings.append(
+            f"'{material.name}': Sigma0 is animated or connected; the command line replaces that."
+        )
+    if options.albedo and mesh_file:
+        _free(material, node.inputs["Base Color"])
+        node.inputs["Base Color"].default_value = (*options.albedo, 1.0)
+
+
+def _free(material: bpy.types.Material, socket: bpy.types.NodeSocket) -> bool:
+    """Disconnect a socket from links, keyframes and drivers; tell whether there were any."""
+    tree = material.node_tree
+    links = list(socket.links)
+    for link in links:
+        tree.links.remove(link)
+    path = socket.path_from_id("default_value")
+    curves = compat.animation_curves(tree, path)
+    for curve in curves:
+        curve.mute = True
+    return bool(links or curves)
 
 
 def translucent_materials() -> list[bpy.types.Material]:
@@ -315,7 +361,7 @@ def _render_all(
         raise SceneError(f"{path} does not exist.")
     key = job_key(path, options)
     suffix = ".exr" if options.format == "EXR" else ".png"
-    sigmas: list[float | None] = list(options.sigma0) or [None]
+    sigmas: list[float | None] = list(dict.fromkeys(options.sigma0)) or [None]
     if options.frames:
         planned = [
             options.output / f"{stem}_{_label(sigma)}_{frame:04d}{suffix}"
@@ -342,11 +388,11 @@ def _render_all(
                 continue
             start = time.perf_counter()
             if options.lambert and not (offset and lambert.exists()):
-                with record.stage("render Lambert"):
-                    _set_sigma0(dict.fromkeys(own, 0.0))
+                with record.stage("render Lambert"), without_scattering():
                     stage.render_to(lambert)
             with record.stage("render CDRF"):
-                _set_sigma0(own if sigma is None else dict.fromkeys(own, sigma))
+                if sigma is not None:
+                    _set_sigma0(dict.fromkeys(own, sigma))
                 stage.render_to(target)
             if options.lambert:
                 with record.stage("join"):
@@ -357,6 +403,7 @@ def _render_all(
             if options.lambert:
                 entry |= {"lambert": str(lambert), "side_by_side": str(_joined(target))}
             record.images.append(entry)
+            note_done(options.output, target, key)
             say(f"  {at} {target.name} in {seconds:.1f} s")
     if options.save_blend:
         _set_sigma0(own)
@@ -365,7 +412,28 @@ def _render_all(
 
 
 def _label(sigma: float | None) -> str:
-    return "cdrf" if sigma is None else f"s{sigma:g}"
+    # repr tells any two numbers apart, so no picture overwrites another.
+    return "cdrf" if sigma is None else f"s{sigma!r}".removesuffix(".0")
+
+
+@contextmanager
+def without_scattering() -> Iterator[None]:
+    """Make every surface Lambert inside the block: sigma0 times a ratio of zero.
+
+    The ratio goes to the socket, so that no other node group is chosen, and Sigma0 may be animated.
+    """
+    sockets = []
+    for material in translucent_materials():
+        node = cdrf_node(material)
+        assert node is not None
+        sockets.append((node.inputs["Sigma0 Ratio"], material.cdrf.sigma0_ratio[:]))
+    try:
+        for socket, _ in sockets:
+            socket.default_value = (0.0, 0.0, 0.0)
+        yield
+    finally:
+        for socket, ratio in sockets:
+            socket.default_value = ratio
 
 
 def _joined(target: Path) -> Path:
@@ -404,13 +472,23 @@ def unique_stems(paths: list[Path]) -> list[str]:
     return stems
 
 
-def read_done(summary: Path) -> dict[str, str]:
-    """Read from an earlier run's summary which picture was made with which settings."""
+def read_done(output: Path) -> dict[str, str]:
+    """Read from the journal of earlier runs which picture was made with which settings."""
+    done: dict[str, str] = {}
     try:
-        scenes = json.loads(summary.read_text())["scenes"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}  # no earlier run, or not one of ours: everything is rendered
-    return {image["path"]: image["key"] for scene in scenes for image in scene["images"]}
+        lines = (output / JOURNAL).read_text().splitlines()
+    except (OSError, ValueError):
+        return done  # no earlier run: everything is rendered
+    for line in lines:
+        path, _, key = line.rpartition("\t")
+        done[path] = key
+    return done
+
+
+def note_done(output: Path, target: Path, key: str) -> None:
+    """Add a picture to the journal, at once, so that a killed run has it."""
+    with (output / JOURNAL).open("a") as journal:
+        journal.write(f"{target}\t{key}\n")
 
 
 def write_summary(summary: Path, scenes: list[SceneRecord], seconds: float) -> None:
@@ -513,13 +591,19 @@ def _run(options: argparse.Namespace) -> int:
     ensure_registered()
     start = time.perf_counter()
     summary = options.output / "summary.json"
-    done = read_done(summary)
+    done = read_done(options.output)
     scenes: list[SceneRecord] = []
     stems = unique_stems(options.inputs)
     for number, (path, stem) in enumerate(zip(options.inputs, stems, strict=True), 1):
         say(f"({number}/{len(stems)}) {path}")
         single = len(stems) == 1
-        record = (render_scene if single else run_in_process)(path, stem, options, done)
+        try:
+            record = (render_scene if single else run_in_process)(path, stem, options, done)
+        except KeyboardInterrupt:
+            scenes.append(SceneRecord(str(path), "stopped"))
+            write_summary(summary, scenes, time.perf_counter() - start)
+            say("Stopped. The same command goes on from here.")
+            return 130
         scenes.append(record)
         for line in record.warnings:
             say(f"  note: {line}")

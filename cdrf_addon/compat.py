@@ -9,11 +9,35 @@ EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT
 """Identifier of the EEVEE engine in `scene.render.engine`."""
 
 
+def set_still_format(settings: bpy.types.ImageFormatSettings, kind: str) -> None:
+    """Make renders write single pictures; from 5.0 on a scene may be set to video or layers."""
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format = kind
+
+
 def ensure_node_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.ShaderNodeTree:
     """Return the node tree of a material or world; 4.5 makes it only on request."""
     if owner.node_tree is None:
         owner.use_nodes = True
     return owner.node_tree
+
+
+def animation_curves(tree: bpy.types.ID, path: str) -> list[bpy.types.FCurve]:
+    """List the F-curves, keyframed or driven, that move a property of a node tree.
+
+    Actions are layered from 4.4 on; 5.0 dropped the flat list of curves.
+    """
+    data = tree.animation_data
+    if data is None:
+        return []
+    curves = list(data.drivers)
+    if data.action is not None:
+        for layer in data.action.layers:
+            for strip in layer.strips:
+                for bag in strip.channelbags:
+                    curves += list(bag.fcurves)
+    return [curve for curve in curves if curve.data_path == path]
 
 
 def uses_nodes(material: bpy.types.Material) -> bool:

@@ -28,6 +28,10 @@ ROLE_SHADER: Final = "shader"
 ROLE_DISPLAY: Final = "display"
 ROLE_REFLECTANCE: Final = "reflectance"
 ROLE_LUT: Final = "lut"
+ROLE_OUTPUT: Final = "output"
+ROLE_ALPHA: Final = "alpha"
+ROLE_TRANSPARENT: Final = "transparent"
+ROLE_DISPLAY_PART: Final = "display part"
 
 # --- sockets ------------------------------------------------------------------------------------
 BASE_COLOR: Final = "Base Color"

@@ -145,6 +145,12 @@ class CDRF_OT_setup(_Job):
         min=2,
         max=10,
     )
+    only_active_object: BoolProperty(
+        name="Only Active Object",
+        description="Work on the active object instead of the selected ones",
+        default=False,
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
     recompute: BoolProperty(
         name="Recompute",
         description="Measure the curvature again even where nothing has changed",
@@ -155,7 +161,7 @@ class CDRF_OT_setup(_Job):
     def make_job(self, context: bpy.types.Context) -> Setup:
         return Setup(
             context,
-            context.selected_objects,
+            [context.object] if self.only_active_object else context.selected_objects,
             radius=self.radius,
             only_active_slot=self.only_active_slot,
             recompute=self.recompute,
@@ -171,8 +177,7 @@ class CDRF_OT_update(_Job):
 
     def make_job(self, context: bpy.types.Context) -> Setup:
         objects = translucent_objects(context.view_layer)
-        radius = max((item.data.cdrf.radius for item in objects), default=DEFAULT_RADIUS)
-        return Setup(context, objects, radius=radius, convert=False)
+        return Setup(context, objects, convert=False)
 
 
 class CDRF_OT_remove(bpy.types.Operator):

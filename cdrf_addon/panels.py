@@ -150,7 +150,8 @@ class CDRF_PT_material(bpy.types.Panel):
         layout = self.layout
         material = context.object.active_material
         if materials.cdrf_node(material) is None:
-            layout.operator("cdrf.setup", icon="SHADING_RENDERED").only_active_slot = True
+            button = layout.operator("cdrf.setup", icon="SHADING_RENDERED")
+            button.only_active_slot = button.only_active_object = True
             return
         draw_skin(layout, context, material)
         draw_state(layout, context, context.object)

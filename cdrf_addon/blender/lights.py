@@ -68,7 +68,7 @@ def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> lis
 
 
 def _render_visible(layer: bpy.types.LayerCollection) -> set[str]:
-    if layer.exclude or layer.collection.hide_render or layer.holdout:
+    if layer.exclude or layer.collection.hide_render:
         return set()
     names = {item.name for item in layer.collection.objects}
     for child in layer.children:

@@ -7,6 +7,7 @@ and output stay, so Cycles renders them as before, and removing our two nodes re
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -46,14 +47,20 @@ def require_editable(data: bpy.types.ID) -> None:
         )
 
 
-def find_surface_source(material: bpy.types.Material) -> tuple[Any, Any]:
-    """Find the base colour and the normal of a material's present surface.
+@dataclass(frozen=True)
+class SurfaceSource:
+    """What the artist's present surface is fed with: sockets where linked, else plain values."""
 
-    Returns:
-        Colour: a socket it is linked from, or an RGBA default. Normal: a socket, or None.
-    """
+    colour: Any
+    normal: Any = None
+    """A socket, or None for the geometry's own."""
+    alpha: Any = 1.0
+
+
+def find_surface_source(material: bpy.types.Material) -> SurfaceSource:
+    """Find the base colour, normal and alpha of a material's present surface."""
     if not uses_nodes(material):
-        return tuple(material.diffuse_color), None
+        return SurfaceSource(tuple(material.diffuse_color))
     output = material.node_tree.get_output_node("EEVEE")
     pending = [output.inputs["Surface"]] if output else []
     seen = set()
@@ -66,46 +73,98 @@ def find_surface_source(material: bpy.types.Material) -> tuple[Any, Any]:
             continue
         seen.add(node.name)
         for name in COLOUR_INPUTS:
-            colour = node.inputs.get(name)
-            if colour is not None and node.type != "EMISSION":
-                normal = node.inputs.get("Normal")
-                return (
-                    colour.links[0].from_socket
-                    if colour.is_linked
-                    else tuple(colour.default_value),
-                    normal.links[0].from_socket
-                    if normal is not None and normal.is_linked
-                    else None,
+            if name in node.inputs and node.type != "EMISSION":
+                return SurfaceSource(
+                    _fed(node, name), _link(node, "Normal"), _fed(node, "Alpha", 1.0)
                 )
         pending += [item for item in node.inputs if item.type == "SHADER"]
-    return tuple(material.diffuse_color), None
+    return SurfaceSource(tuple(material.diffuse_color))
+
+
+def _link(node: bpy.types.ShaderNode, name: str) -> Any:
+    socket = node.inputs.get(name)
+    return socket.links[0].from_socket if socket is not None and socket.is_linked else None
+
+
+def _fed(node: bpy.types.ShaderNode, name: str, default: Any = None) -> Any:
+    if name not in node.inputs:
+        return default
+    value = node.inputs[name].default_value
+    return _link(node, name) or (value if isinstance(value, float) else tuple(value))
+
+
+def _own(tree: bpy.types.ShaderNodeTree | None, role: str) -> bpy.types.ShaderNode | None:
+    """Find a node that we put into a material, whatever its name by now."""
+    nodes = tree.nodes if tree else ()
+    return next((node for node in nodes if node.get(ids.ROLE_KEY) == role), None)
+
+
+def skin_output(material: bpy.types.Material) -> bpy.types.ShaderNode | None:
+    """Return the material's CDRF output, or None if it has none (any more)."""
+    return _own(material.node_tree, ids.ROLE_OUTPUT)
+
+
+def skin_socket(material: bpy.types.Material) -> bpy.types.NodeSocket:
+    """Return the socket that carries the translucent surface, its transparency included."""
+    mix = _own(material.node_tree, ids.ROLE_ALPHA)
+    if mix is not None:
+        return mix.outputs["Shader"]
+    node = cdrf_node(material)
+    assert node is not None
+    return node.outputs[ids.SHADER]
 
 
 def install(material: bpy.types.Material, group: bpy.types.ShaderNodeTree) -> bpy.types.ShaderNode:
     """Make a material translucent in EEVEE, or swap the group of one that is.
 
-    Values and links of the node's inputs survive the swap.
+    Values and links of the node's inputs survive the swap; an output that was deleted comes back.
     """
     node = cdrf_node(material)
-    if node is not None:
-        if node.node_tree != group:
-            _swap(material.node_tree, node, group)
-        return node
-    colour, normal = find_surface_source(material)
-    if not uses_nodes(material):
-        material[PLAIN_KEY] = True
-    tree = ensure_node_tree(material)
-    set_uses_nodes(material, True)
+    if node is None:
+        _remove_own_nodes(material.node_tree)
+        source = find_surface_source(material)
+        if not uses_nodes(material):
+            material[PLAIN_KEY] = True
+        builder = TreeBuilder(ensure_node_tree(material))
+        set_uses_nodes(material, True)
+        node = builder.node("ShaderNodeGroup", ids.NODE, node_tree=group, width=200.0)
+        builder.feed(node.inputs[ids.BASE_COLOR], source.colour)
+        if source.normal is not None:
+            builder.feed(node.inputs[ids.NORMAL], source.normal)
+        former = builder.tree.get_output_node("EEVEE")
+        x, y = former.location if former else (300.0, 0.0)
+        node.location = (x - 60.0, y + 260.0)
+        if source.alpha != 1.0:
+            _add_alpha(builder, node, source.alpha)
+    elif node.node_tree != group:
+        _swap(material.node_tree, node, group)
+    if skin_output(material) is None:
+        _add_output(material, node)
+    return node
+
+
+def _add_alpha(builder: TreeBuilder, node: bpy.types.ShaderNode, alpha: Any) -> None:
+    """Let the surface be as transparent as the artist's: alpha mixes it with Transparent."""
+    clear = builder.node("ShaderNodeBsdfTransparent")
+    clear[ids.ROLE_KEY] = ids.ROLE_TRANSPARENT
+    mix = builder.node("ShaderNodeMixShader")
+    mix[ids.ROLE_KEY] = ids.ROLE_ALPHA
+    # Mix Shader's inputs: the factor, then two that are both called Shader.
+    for socket, operand in zip(
+        mix.inputs, (alpha, clear.outputs["BSDF"], node.outputs[ids.SHADER]), strict=True
+    ):
+        builder.feed(socket, operand)
+    clear.location = (node.location[0], node.location[1] + 130.0)
+    mix.location = (node.location[0] + 220.0, node.location[1])
+
+
+def _add_output(material: bpy.types.Material, node: bpy.types.ShaderNode) -> None:
+    tree = material.node_tree
     former = tree.get_output_node("EEVEE")
-    builder = TreeBuilder(tree)
-    node = builder.node("ShaderNodeGroup", ids.NODE, node_tree=group, width=200.0)
-    builder.feed(node.inputs[ids.BASE_COLOR], colour)
-    if normal is not None:
-        builder.feed(node.inputs[ids.NORMAL], normal)
-    output = builder.node("ShaderNodeOutputMaterial", ids.OUTPUT_NODE, target="EEVEE")
-    builder.feed(output.inputs["Surface"], node.outputs[ids.SHADER])
-    x, y = former.location if former else (300.0, 0.0)
-    node.location, output.location = (x - 60.0, y + 260.0), (x + 200.0, y + 260.0)
+    output = TreeBuilder(tree).node("ShaderNodeOutputMaterial", ids.OUTPUT_NODE, target="EEVEE")
+    output[ids.ROLE_KEY] = ids.ROLE_OUTPUT
+    output.location = (node.location[0] + 420.0, node.location[1])
+    tree.links.new(skin_socket(material), output.inputs["Surface"])
     if former is not None:
         # Displacement and thickness go on as they were; only the surface is replaced.
         for socket in former.inputs:
@@ -114,7 +173,6 @@ def install(material: bpy.types.Material, group: bpy.types.ShaderNodeTree) -> bp
         if former.target == "EEVEE":
             former.is_active_output = False
     output.is_active_output = True
-    return node
 
 
 def _swap(
@@ -145,10 +203,8 @@ def remove(material: bpy.types.Material) -> bool:
     if node is None:
         return False
     tree = material.node_tree
-    output = tree.nodes.get(ids.OUTPUT_NODE)
-    if output is not None:
-        tree.nodes.remove(output)
     tree.nodes.remove(node)
+    _remove_own_nodes(tree)
     for other in tree.nodes:
         if other.type == "OUTPUT_MATERIAL" and other.target == "EEVEE":
             other.is_active_output = True
@@ -156,3 +212,11 @@ def remove(material: bpy.types.Material) -> bool:
         del material[PLAIN_KEY]
         set_uses_nodes(material, False)
     return True
+
+
+def _remove_own_nodes(tree: bpy.types.ShaderNodeTree | None) -> None:
+    if tree is None:
+        return
+    for node in list(tree.nodes):
+        if ids.ROLE_KEY in node:
+            tree.nodes.remove(node)

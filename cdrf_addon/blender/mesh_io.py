@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import ids
 from ..core.errors import MeshError
-from ..core.mesh import TriMesh
+from ..core.mesh import TriMesh, edge_lengths
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -92,6 +92,8 @@ def read_shape(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph, radius: i
             f"'{item.name}' has a scale of zero along an axis; give it a size (N panel > Scale)."
         )
     evaluated = item.evaluated_get(depsgraph)
+    if not evaluated.is_evaluated:
+        raise MeshError(f"'{item.name}' is hidden with its collection: show that and try again.")
     mesh = evaluated.to_mesh()
     try:
         if mesh is None or not len(mesh.polygons):
@@ -124,6 +126,39 @@ def read_shape(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph, radius: i
 
 
 @contextmanager
+def evaluable(
+    items: Iterable[bpy.types.Object],
+    view_layer: bpy.types.ViewLayer,
+    depsgraph: bpy.types.Depsgraph,
+) -> Iterator[None]:
+    """Show hidden objects inside the `with` block: Blender does not evaluate what it hides."""
+    hidden = [
+        (item, item.hide_viewport, item.hide_get(view_layer=view_layer))
+        for item in items
+        if item.hide_viewport or item.hide_get(view_layer=view_layer)
+    ]
+    for item, *_ in hidden:
+        item.hide_viewport = False
+        item.hide_set(False, view_layer=view_layer)
+    try:
+        if hidden:
+            depsgraph.update()
+        yield
+    finally:
+        for item, everywhere, here in hidden:
+            item.hide_set(here, view_layer=view_layer)
+            item.hide_viewport = everywhere
+
+
+def coordinate_noise(mesh: TriMesh) -> float:
+    """Curvature that the rounding of float32 positions alone may feign: rounding / edge^2."""
+    used = mesh.vertices[mesh.triangles[:, 0]]
+    largest = float(np.median(np.abs(used).max(axis=1)))
+    edge = float(np.median(edge_lengths(mesh.vertices, mesh.triangles)))
+    return largest * float(np.finfo(np.float32).eps) / edge**2 if edge > 0.0 else 0.0
+
+
+@contextmanager
 def evaluated_origins(
     item: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> Iterator[NDArray[np.int64]]:
@@ -150,10 +185,13 @@ def evaluated_origins(
                 carried.data.foreach_get("vector", arrived.ravel())
         finally:
             evaluated.to_mesh_clear()
-        from scipy.spatial import cKDTree
+        origin = np.full(len(arrived), -1, dtype=np.int64)
+        if arrived.any():
+            from scipy.spatial import cKDTree
 
-        distance, nearest = cKDTree(code).query(arrived, distance_upper_bound=1e-6)
-        yield np.where(np.isfinite(distance), nearest, -1).astype(np.int64)
+            distance, nearest = cKDTree(code).query(arrived, distance_upper_bound=1e-6)
+            origin = np.where(np.isfinite(distance), nearest, -1).astype(np.int64)
+        yield origin
     finally:
         mesh.attributes.remove(mesh.attributes[name])
         mesh.update_tag()
@@ -232,7 +270,7 @@ def write_curvature(mesh: bpy.types.Mesh, values: NDArray[np.float32]) -> None:
         active = mesh.color_attributes.active_color_name
         render = mesh.color_attributes.render_color_index
         attribute = mesh.attributes.new(ids.CURVATURE_ATTRIBUTE, "FLOAT_COLOR", "POINT")
-        if active:
+        if active and render >= 0:
             mesh.color_attributes.active_color_name = active
             mesh.color_attributes.render_color_index = render
         attribute = mesh.attributes[ids.CURVATURE_ATTRIBUTE]

@@ -122,7 +122,7 @@ def ensure_group(
     `build` declares the interface with `declare` and adds the nodes.
     """
     group = find_group(role, name)
-    if group is not None and group.get(ids.VERSION_KEY) == version:
+    if group is not None and group.get(ids.VERSION_KEY) == version and is_intact(group):
         return group
     if group is None:
         group = bpy.data.node_groups.new(name, "ShaderNodeTree")
@@ -130,6 +130,16 @@ def ensure_group(
     rebuild(group, build)
     group[ids.VERSION_KEY] = version
     return group
+
+
+def is_intact(tree: bpy.types.ShaderNodeTree) -> bool:
+    """Tell whether nothing that the tree's nodes refer to was deleted (a group, the table)."""
+    for node in tree.nodes:
+        if node.type == "GROUP" and (node.node_tree is None or not is_intact(node.node_tree)):
+            return False
+        if node.type == "TEX_IMAGE" and node.image is None:
+            return False
+    return any(node.type == "GROUP_OUTPUT" for node in tree.nodes)
 
 
 def rebuild(group: bpy.types.ShaderNodeTree, build: Callable[[TreeBuilder], None]) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from .. import ids
 from ..compat import EEVEE
 from ..core.curvature import DEFAULT_RADIUS, curvature_steps
-from ..core.errors import CdrfError, SceneError
+from ..core.errors import CdrfError, DependencyError, SceneError
 from ..core.sphere import sphere_curvature
 from ..core.summary import CONSTANT, FLAT, CurvatureSummary, summarise
 from . import display, shader, state
@@ -27,6 +27,8 @@ from .materials import cdrf_node, install, require_editable
 from .mesh_io import (
     Shape,
     base_fingerprint,
+    coordinate_noise,
+    evaluable,
     has_curvature,
     read_shape,
     remove_curvature,
@@ -40,6 +42,8 @@ if TYPE_CHECKING:
 # sigma of the first look, at the median curvature: visible, not yet wax.
 FIRST_SIGMA = 0.25
 SAME_SIZE = 1e-4
+# Part of the median curvature that the rounding of coordinates may make up without a warning.
+COARSE_COORDINATES = 0.05
 
 
 @dataclass
@@ -78,6 +82,7 @@ class _MeshWork:
     """None where nothing had to be computed."""
     values: NDArray[np.float32] | None = None
     evaluated_vertices: int = 0
+    radius: int = DEFAULT_RADIUS
     seconds: float = 0.0
     warnings: list[str] = field(default_factory=list)
 
@@ -100,7 +105,7 @@ class Setup:
     Args:
         context: For the scene, the view layer and the dependency graph.
         objects: What to work on; other users of the same materials are included by themselves.
-        radius: Rings of the curvature fit.
+        radius: Rings of the curvature fit; None keeps what each mesh was measured with.
         only_active_slot: Convert an object's active material slot only.
         convert: False to leave materials alone that are not translucent yet.
         recompute: True to estimate the curvature even where nothing has changed.
@@ -114,7 +119,7 @@ class Setup:
         context: bpy.types.Context,
         objects: Iterable[bpy.types.Object],
         *,
-        radius: int = DEFAULT_RADIUS,
+        radius: int | None = None,
         only_active_slot: bool = False,
         convert: bool = True,
         recompute: bool = False,
@@ -148,11 +153,7 @@ class Setup:
                 raise SceneError(f"'{item.name}' is in Edit Mode: leave it first (Tab).")
             self.objects.append(item)
         if not self.objects:
-            raise SceneError(
-                "No mesh object is selected: click the object that should become translucent."
-                if convert
-                else "Nothing in this scene is translucent yet: press Make Translucent first."
-            )
+            raise SceneError(self._nothing_to_do(convert))
         for item in self.objects:
             slots = list(item.material_slots)
             if only_active_slot and slots:
@@ -161,10 +162,21 @@ class Setup:
                 slots = [slot for slot in slots if cdrf_node(slot.material) is not None]
             elif not slots:
                 require_editable(item.data)
-                self.bare.append(item)
+                if all(other.data != item.data for other in self.bare):
+                    self.bare.append(item)
             for slot in slots:
                 require_editable(slot.material or item.data)
             self.slots += slots
+
+    def _nothing_to_do(self, convert: bool) -> str:
+        if convert:
+            return "No mesh object is selected: click the object that should become translucent."
+        if any(linked_skins(item) for item in self.view_layer.objects):
+            return (
+                "The translucent materials here are linked from another file: update them there, "
+                "or make them local (Object > Relations > Make Local)."
+            )
+        return "Nothing in this scene is translucent yet: press Make Translucent first."
 
     def _gather(self) -> list[_MeshWork]:
         """Group by mesh all objects of the scene that show one of the materials."""
@@ -190,22 +202,40 @@ class Setup:
     def steps(self) -> Generator[tuple[float, str], None, None]:
         """Compute what has changed, yielding the part done and what is being done.
 
+        A mesh that cannot be used is left as it is, with a warning, if there are others.
+
         Raises:
-            CdrfError: A mesh cannot be used; nothing has been changed.
+            CdrfError: No mesh can be used; nothing has been changed.
         """
         sizes = [max(len(work.mesh.vertices), 1) for work in self.work]
         total, done = float(sum(sizes)), 0
-        for work, size in zip(self.work, sizes, strict=True):
-            for part in self._compute(work):
-                yield (done + part * size) / total, f"Curvature of {work.users[0].name}"
+        for work, size in zip(list(self.work), sizes, strict=True):
+            try:
+                for part in self._compute(work):
+                    yield (done + part * size) / total, f"Curvature of {work.users[0].name}"
+            except DependencyError:
+                raise
+            except CdrfError as error:
+                if len(self.work) == 1:
+                    raise
+                self._leave_out(work, str(error))
             done += size
+
+    def _leave_out(self, work: _MeshWork, reason: str) -> None:
+        self.work.remove(work)
+        self.bare = [item for item in self.bare if item.data != work.mesh]
+        owners = {*work.users, work.mesh}
+        self.slots = [slot for slot in self.slots if slot.id_data not in owners]
+        self.report.warnings.append(f"Left out: {reason}")
 
     def _compute(self, work: _MeshWork) -> Generator[float, None, None]:
         start = time.perf_counter()
         first, *others = work.users
-        shape = read_shape(first, self.depsgraph, self.radius)
-        for other in others:
-            work.sizes[other.name] = self._relative_size(other, shape, first)
+        work.radius = self.radius or work.mesh.cdrf.radius
+        with evaluable(work.users, self.view_layer, self.depsgraph):
+            shape = read_shape(first, self.depsgraph, work.radius)
+            for other in others:
+                work.sizes[other.name] = self._relative_size(other, shape, first, work.radius)
         work.sizes[first.name] = 1.0
         work.fingerprint = shape.fingerprint
         work.metric = shape.metric
@@ -218,7 +248,7 @@ class Setup:
         try:
             field_ = sphere_curvature(shape.mesh)
             if field_ is None:
-                field_ = yield from curvature_steps(shape.mesh, self.radius)
+                field_ = yield from curvature_steps(shape.mesh, work.radius)
         except CdrfError as error:
             raise type(error)(f"'{first.name}': {error}") from error
         work.summary = summarise(shape.mesh, field_)
@@ -226,18 +256,30 @@ class Setup:
         values = np.stack((field_.kappa, field_.k1, field_.k2, field_.mean), axis=1)
         limit = np.finfo(np.float32).max
         stored = np.clip(values, -limit, limit).astype(np.float32)
-        work.values, lost = to_original_vertices(first, self.depsgraph, stored)
+        with evaluable(work.users, self.view_layer, self.depsgraph):
+            work.values, lost = to_original_vertices(first, self.depsgraph, stored)
+        if lost == len(work.mesh.vertices):
+            raise SceneError(
+                f"'{first.name}' has a modifier that replaces the whole mesh (Remesh, Skin, some "
+                "geometry nodes), which takes the curvature off again: apply that modifier first."
+            )
         if lost:
             work.warnings.append(
                 f"{lost:,} vertices do not survive the modifiers; their curvature is that of the "
                 "nearest point. Apply the modifiers for exact values."
             )
+        noise = coordinate_noise(shape.mesh)
+        if noise > COARSE_COORDINATES * work.summary.median and work.summary.kind != FLAT:
+            work.warnings.append(
+                "The mesh lies far from its origin, where coordinates are coarse, so its curvature "
+                "is noisy: set the origin to the geometry (Object > Set Origin) and update."
+            )
         work.seconds = time.perf_counter() - start
 
     def _relative_size(
-        self, other: bpy.types.Object, shape: Shape, first: bpy.types.Object
+        self, other: bpy.types.Object, shape: Shape, first: bpy.types.Object, radius: int
     ) -> float:
-        factor = read_shape(other, self.depsgraph, self.radius).size_relative_to(shape)
+        factor = read_shape(other, self.depsgraph, radius).size_relative_to(shape)
         if factor is None:
             raise SceneError(
                 f"'{other.name}' and '{first.name}' share a mesh, but modifiers or scale give them "
@@ -291,12 +333,13 @@ class Setup:
         return shader.ATTRIBUTE
 
     def _store(self, work: _MeshWork, sources: dict[bpy.types.Material, str]) -> None:
-        needed = any(
-            sources.get(material) in {shader.ATTRIBUTE, shader.SCALED}
+        # Materials outside this job may be translucent too and read the same attribute.
+        read = {
+            sources.get(material) or _present_source(material)
             for item in work.users
             for material in _materials(item)
-        )
-        if not needed:
+        }
+        if not read & {shader.ATTRIBUTE, shader.SCALED}:
             remove_curvature(work.mesh)
         elif work.values is not None:
             write_curvature(work.mesh, work.values)
@@ -311,7 +354,7 @@ class Setup:
             elif ids.SCALE_KEY in item:
                 del item[ids.SCALE_KEY]
         if work.summary is not None:
-            _remember(work, self.radius)
+            _remember(work)
 
     def _install(self, material: bpy.types.Material, source: str, lights: list[SceneLight]) -> None:
         settings = material.cdrf
@@ -345,6 +388,13 @@ class Setup:
                 report.warnings.append(
                     f"'{work.users[0].name}' is flat: it looks the same at any scatter distance."
                 )
+        for item in self.view_layer.objects:
+            inside = item.instance_collection if item.instance_type == "COLLECTION" else None
+            if inside is not None and any(part.type == "LIGHT" for part in inside.all_objects):
+                report.warnings.append(
+                    f"The lights inside the instance '{item.name}' do not reach the surface: "
+                    "make them real (Object > Apply > Make Instances Real)."
+                )
         if not lights:
             report.warnings.append("The scene has no light that renders, so the surface is black.")
         if self.scene.render.engine not in {EEVEE, "BLENDER_WORKBENCH"}:
@@ -371,11 +421,21 @@ def translucent_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Objec
     ]
 
 
+def linked_skins(item: bpy.types.Object) -> list[bpy.types.Material]:
+    """List the translucent materials of an object that another file owns."""
+    return [m for m in _materials(item) if cdrf_node(m) is not None and not m.is_editable]
+
+
+def _present_source(material: bpy.types.Material) -> str:
+    node = cdrf_node(material)
+    return shader.stamped_variant(node.node_tree).source if node is not None else ""
+
+
 def scene_of_group(
     group: bpy.types.ShaderNodeTree,
 ) -> tuple[bpy.types.Scene, list[SceneLight]] | None:
-    """Return the scene a shader group was made for and its lights; None if it is gone."""
-    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, ""))
+    """Return the scene a shader group was made for and its lights; the open one if it is gone."""
+    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
     if scene is None:
         return None
     current = bpy.context.view_layer
@@ -406,7 +466,7 @@ def _first_sigma0(work: list[_MeshWork]) -> float:
     return float(f"{FIRST_SIGMA / float(np.median(medians)):.2g}")
 
 
-def _remember(work: _MeshWork, radius: int) -> None:
+def _remember(work: _MeshWork) -> None:
     known, summary = work.mesh.cdrf, work.summary
     assert summary is not None and work.metric is not None
     known.fingerprint = work.fingerprint
@@ -415,7 +475,7 @@ def _remember(work: _MeshWork, radius: int) -> None:
     known.low, known.median, known.high = summary.low, summary.median, summary.high
     known.mean_values = summary.mean_values
     known.metric = work.metric.ravel()
-    known.radius = radius
+    known.radius = work.radius
     known.vertices = len(work.mesh.vertices)
     known.evaluated_vertices = work.evaluated_vertices
     known.seconds = work.seconds

@@ -22,7 +22,7 @@ import bpy
 from .. import ids
 from .groups import light_group, reflectance_group
 from .lights import SceneLight, drive_light
-from .nodetree import TreeBuilder, declare, rebuild
+from .nodetree import TreeBuilder, declare, is_intact, rebuild
 
 VERSION = 2
 
@@ -112,7 +112,11 @@ def _find(variant: Variant, scene: bpy.types.Scene) -> bpy.types.ShaderNodeTree 
 def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -> bool:
     """Tell whether the group has exactly these lights, each of the type it was wired for."""
     wanted = {(light.object, light.kind) for light in lights}
-    return group.get(ids.VERSION_KEY) == VERSION and set(wired_lights(group)) == wanted
+    return (
+        group.get(ids.VERSION_KEY) == VERSION
+        and is_intact(group)
+        and set(wired_lights(group)) == wanted
+    )
 
 
 def wired_lights(

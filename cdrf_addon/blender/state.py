@@ -13,7 +13,7 @@ import numpy as np
 from .. import ids
 from . import shader
 from .lights import SceneLight, scene_lights
-from .materials import cdrf_node
+from .materials import cdrf_node, skin_output
 from .mesh_io import base_fingerprint, has_curvature, linear_part
 
 _touched: set[int] = set()
@@ -69,7 +69,7 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
     gone = len(wired) - len(before) + sum(item not in now for item in before)
     if gone:
         parts.append(f"{gone} light{'s are' if gone > 1 else ' is'} gone or hidden")
-    return "; ".join(parts) or "the node group is of an older version"
+    return "; ".join(parts) or "the node group is incomplete or of an older version"
 
 
 def reasons_to_update(
@@ -87,6 +87,8 @@ def reasons_to_update(
         if node is None:
             continue
         group = node.node_tree
+        if skin_output(slot.material) is None:
+            reasons.append("The CDRF Material Output was deleted.")
         if group.get(ids.SCENE_KEY) != scene.name:
             reasons.append(f"'{slot.material.name}' was set up in another scene.")
         due = lights_due(group, lights)
@@ -98,16 +100,24 @@ def reasons_to_update(
             reasons.append("The colour ratio was changed in the node.")
         if variant.source in {shader.ATTRIBUTE, shader.SCALED} and not has_curvature(item.data):
             reasons.append(f"'{item.name}' has no curvature yet.")
-    reasons += _shape_reasons(item, playing)
+    reasons += _shape_reasons(item, view_layer, playing)
     return list(dict.fromkeys(reasons))
 
 
-def _shape_reasons(item: bpy.types.Object, playing: bool) -> list[str]:
+def _shape_reasons(
+    item: bpy.types.Object, view_layer: bpy.types.ViewLayer, playing: bool
+) -> list[str]:
     known = item.data.cdrf
     if not known.fingerprint:
         return [f"The curvature of '{item.name}' was never computed."]
     if _mesh_changed(item.data, playing):
         return ["The mesh was edited since its curvature was computed."]
+    depsgraph = view_layer.depsgraph
+    evaluated = item.evaluated_get(depsgraph) if depsgraph is not None and item.modifiers else item
+    count = len(evaluated.data.vertices)
+    # Only what is on screen is evaluated; a hidden object shows its bare mesh.
+    if evaluated.is_evaluated and item.visible_get() and count != known.evaluated_vertices:
+        return ["The modifiers were changed since the curvature was computed."]
     linear = linear_part(item)
     then = np.array(known.metric).reshape(3, 3)
     now = linear.T @ linear * float(item.get(ids.SCALE_KEY, 1.0)) ** 2

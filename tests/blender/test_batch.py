@@ -162,3 +162,45 @@ def test_prepared_scene_keeps_its_settings(rig: Rig, tmp_path: Path) -> None:
 def test_unique_stems() -> None:
     paths = [Path("a/x.obj"), Path("b/x.obj"), Path("x-2.ply")]
     assert batch_render.unique_stems(paths) == ["x", "x-2", "x-2-2"]
+
+
+def test_animated_sigma0_is_replaced_and_display_taken_off(rig: Rig, tmp_path: Path) -> None:
+    rig.light("SUN", rotation=(1.0, 0.0, 0.9))
+    bpy.ops.mesh.primitive_torus_add()
+    item = bpy.context.object
+    bpy.ops.cdrf.setup()
+    node = item.data.materials[0].node_tree.nodes["CDRF"]
+    for frame, value in ((1, 0.0), (3, 0.1)):
+        node.inputs["Sigma0"].default_value = value
+        node.inputs["Sigma0"].keyframe_insert("default_value", frame=frame)
+    rig.scene.render.image_settings.file_format = "PNG"
+    if hasattr(rig.scene.render.image_settings, "media_type"):
+        rig.scene.render.image_settings.media_type = "VIDEO"
+    bpy.ops.cdrf.show_curvature(display="ON")
+    file = tmp_path / "animated.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=True)
+    kept, forced = tmp_path / "kept", tmp_path / "forced"
+    common = ("--frames", "3", "--lambert", *SMALL)
+    assert run(file, "--output", kept, *common).returncode == 0
+    assert run(file, "--output", forced, "--sigma0", "0.1", *common).returncode == 0
+    notes = " ".join(summary(forced)["scenes"][0]["warnings"])
+    assert "animated or connected" in notes and "showing its curvature" in notes
+    lambert = picture(kept / "animated_lambert_0003.png")
+    skin = picture(kept / "animated_cdrf_0003.png")
+    assert np.abs(lambert - skin).max() > 0.02
+    assert np.array_equal(skin, picture(forced / "animated_s0.1_0003.png"))
+    assert np.array_equal(lambert, picture(forced / "animated_lambert_0003.png"))
+
+
+def test_journal_survives_a_kill_and_any_summary(meshes: dict[str, Path], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run(meshes["obj"], "--frames", "1", "--output", out, *SMALL).returncode == 0
+    (out / "summary.json").write_text('{"scenes": [{"images": [{"path": 1}]}]}')
+    again = run(meshes["obj"], "--frames", "1-2", "--output", out, *SMALL)
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert [image["resumed"] for image in summary(out)["scenes"][0]["images"]] == [True, False]
+
+
+def test_close_sigmas_have_files_of_their_own() -> None:
+    labels = {batch_render._label(value) for value in (0.123456789, 0.12345678, 0.1, 1.0, 1e-7)}
+    assert labels == {"s0.123456789", "s0.12345678", "s0.1", "s1", "s1e-07"}

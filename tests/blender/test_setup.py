@@ -401,3 +401,148 @@ def test_curvature_display_follows_an_update_and_goes_away(rig: Rig) -> None:
     assert {node.name for node in tree.nodes} == before
     surface = tree.nodes[ids.OUTPUT_NODE].inputs["Surface"]
     assert surface.links[0].from_node.name == ids.NODE
+
+
+def test_deleted_parts_come_back_at_the_next_update(rig: Rig) -> None:
+    from cdrf_addon.blender.materials import skin_output
+    from cdrf_addon.blender.nodetree import is_intact
+    from cdrf_addon.blender.state import reasons_to_update
+
+    rig.light("SUN")
+    item = torus()
+    bpy.context.view_layer.update()
+    bpy.ops.cdrf.setup()
+    material = item.data.materials[0]
+
+    def whole() -> bool:
+        reasons = reasons_to_update(item, rig.scene, bpy.context.view_layer)
+        output = material.node_tree.get_output_node("EEVEE")
+        linked = output == skin_output(material) and output.inputs["Surface"].is_linked
+        return not reasons and linked and is_intact(cdrf_node(item).node_tree)
+
+    assert whole()
+    bpy.data.images.remove(bpy.data.images[ids.LUT_IMAGE])
+    assert not whole()
+    bpy.ops.cdrf.update()
+    assert whole()
+    bpy.data.node_groups.remove(bpy.data.node_groups["CDRF Sun"])
+    assert not whole()
+    bpy.ops.cdrf.update()
+    assert whole()
+    material.node_tree.nodes.remove(skin_output(material))
+    assert not whole()
+    bpy.ops.cdrf.update()
+    assert whole()
+    output = skin_output(material)
+    assert output is not None
+    output.name = "Renamed"
+    bpy.ops.cdrf.remove()
+    assert [n.name for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL"] == [
+        "Material Output"
+    ]
+
+
+def test_small_values_reach_the_shader_unsnapped(rig: Rig) -> None:
+    """Blender snaps a driver's result to its keyframes within 1e-4; ours have none."""
+    name = 'Key "A" \\ b'
+    lamp = rig.light("SPOT", name=name, energy=1e-5, location=(5e-5, 0.99995, 1.0))
+    lamp.data.spot_size = math.radians(1.0)
+    item = torus()
+    bpy.context.view_layer.update()
+    bpy.ops.cdrf.setup()
+    bpy.context.view_layer.update()
+    inputs = cdrf_node(item).node_tree.nodes[name].inputs
+    assert tuple(inputs["Position"].default_value) == pytest.approx((5e-5, 0.99995, 1.0), rel=1e-6)
+    assert inputs["Power"].default_value[0] == pytest.approx(1e-5 / (4 * math.pi**2), rel=1e-5)
+    assert inputs["Cone Cosine"].default_value == pytest.approx(math.cos(math.radians(0.5)))
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+
+
+def test_each_mesh_keeps_its_own_rings(rig: Rig) -> None:
+    first = torus()
+    bpy.ops.cdrf.setup(radius=5)
+    bpy.ops.object.select_all(action="DESELECT")
+    second = torus(2.0, 0.5)
+    bpy.ops.cdrf.setup()
+    before = attribute(first.data), attribute(second.data)
+    bpy.ops.cdrf.update()
+    assert (first.data.cdrf.radius, second.data.cdrf.radius) == (5, 2)
+    assert np.array_equal(attribute(first.data), before[0])
+    assert np.array_equal(attribute(second.data), before[1])
+
+
+def test_hidden_objects_are_measured_with_their_modifiers(rig: Rig) -> None:
+    bpy.ops.mesh.primitive_monkey_add()
+    item = bpy.context.object
+    item.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    bpy.ops.cdrf.setup()
+    count = item.data.cdrf.evaluated_vertices
+    item.data.vertices[0].co.z += 0.05
+    item.data.update()
+    item.hide_viewport = True
+    bpy.context.view_layer.update()
+    bpy.ops.cdrf.update()
+    assert item.data.cdrf.evaluated_vertices == count > len(item.data.vertices)
+    assert item.hide_viewport
+
+
+def test_one_bad_mesh_does_not_stop_the_others(rig: Rig) -> None:
+    good = torus()
+    bad = rig.link(bpy.data.meshes.new("Edges only"))
+    bad.data.from_pydata([(0, 0, 0), (1, 0, 0)], [(0, 1)], [])
+    bad.select_set(True)
+    good.select_set(True)
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    assert cdrf_of(good) is not None
+    assert not bad.data.materials
+
+
+def test_transparency_is_kept(rig: Rig) -> None:
+    from cdrf_addon.compat import ensure_node_tree
+
+    rig.light("SUN", rotation=(1.0, 0.0, 0.5))
+    item = torus()
+    material = bpy.data.materials.new("Lash")
+    tree = ensure_node_tree(material)
+    principled = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+    principled.inputs["Alpha"].default_value = 0.0
+    item.data.materials.append(material)
+    before = {node.name for node in tree.nodes}
+    bpy.ops.cdrf.setup()
+    assert rig.render()[..., 3].max() == 0.0
+    material.cdrf.sigma0_ratio = (1.0, 0.5, 0.2)  # another group: the mix must survive the swap
+    assert rig.render()[..., 3].max() == 0.0
+    bpy.ops.cdrf.remove()
+    assert {node.name for node in tree.nodes} == before
+
+
+def test_modifier_that_replaces_the_mesh_is_refused(rig: Rig) -> None:
+    item = torus()
+    item.modifiers.new("Remesh", "REMESH").voxel_size = 0.2
+    refuses(bpy.ops.cdrf.setup, "Remesh", "apply")
+
+
+def test_changed_modifiers_are_noticed(rig: Rig) -> None:
+    from cdrf_addon.blender.state import reasons_to_update
+
+    item = torus()
+    bpy.ops.cdrf.setup()
+    item.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    bpy.context.view_layer.update()
+    due = reasons_to_update(item, rig.scene, bpy.context.view_layer)
+    assert any("modifiers" in reason for reason in due)
+    bpy.ops.cdrf.update()
+    bpy.context.view_layer.update()
+    assert reasons_to_update(item, rig.scene, bpy.context.view_layer) == []
+
+
+def test_linked_skin_is_named_in_the_refusal(rig: Rig, tmp_path: Path) -> None:
+    torus().name = "Hero"
+    bpy.ops.cdrf.setup()
+    file = tmp_path / "hero.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=True)
+    fresh = Rig()
+    with bpy.data.libraries.load(str(file), link=True) as (_, wanted):
+        wanted.objects = ["Hero"]
+    fresh.scene.collection.objects.link(wanted.objects[0])
+    refuses(bpy.ops.cdrf.update, "linked from another file")
