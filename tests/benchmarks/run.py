@@ -4,13 +4,14 @@
     ./dev python tests/benchmarks/run.py            everything, about ten minutes on two cores
     ./dev python tests/benchmarks/run.py --only lut curvature setup frame
 
-Timings are CPU seconds of this process. Frame costs are interleaved and given as ratios, as those
-of a software rasteriser mean little by themselves.
+Timings are CPU seconds of this process. Draws are given as ratios too, as those of a software
+rasteriser mean little by themselves; they need Blender 5.2.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import math
 import os
@@ -39,7 +40,8 @@ from cdrf_addon.core.mesh import TriMesh  # noqa: E402
 from cdrf_addon.core.reflectance import reflectance  # noqa: E402
 
 SEED = 20111106
-ROUNDS = 6
+DRAWS = 15
+DRAW_PIXELS = 1024
 Rows = list[list[Any]]
 
 
@@ -179,35 +181,60 @@ def _contenders(rig: Rig) -> dict[str, Callable[[], None]]:
 
 
 def bench_frame() -> tuple[str, list[str], Rows]:
-    """CPU time of a frame, interleaved, as a ratio to the Diffuse BSDF under one sun."""
+    """Time of a viewport draw; final renders vary by a factor of three from run to run here.
+
+    The Diffuse BSDF comes first and last, so that a drift of the machine shows.
+    """
+    import gpu  # late: only Blender 5.2 can draw without a window
+
+    gpu.init()
     rig = Rig()
     contenders = _contenders(rig)
-    rig.scene.render.resolution_x = rig.scene.render.resolution_y = 256
-    rig.scene.eevee.taa_render_samples = 8
-    rig.scene.render.film_transparent = False
-    times: dict[str, list[float]] = {name: [] for name in contenders}
-    first: dict[str, float] = {}
-    for turn in range(ROUNDS + 1):
-        for name, prepare in contenders.items():
-            prepare()
-            start = time.process_time()
-            rig.render()
-            spent = time.process_time() - start
-            if turn:
-                times[name].append(spent)
-            else:
-                first[name] = spent  # with the shader's compilation
-    # The machine runs at one of two speeds, a factor of two apart, for minutes at a time: the least
-    # of the rounds compares like with like, the median and the greatest show the spread.
-    base = min(times["Diffuse BSDF, 1 sun"])
+    rig.scene.eevee.taa_samples = 1
+    area = next(a for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
+    space = area.spaces.active
+    space.shading.type = "RENDERED"
+    space.overlay.show_overlays = False
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    target = gpu.types.GPUOffScreen(DRAW_PIXELS, DRAW_PIXELS, format="RGBA16F")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    view = rig.camera.matrix_world.inverted()
+    lens = rig.camera.calc_matrix_camera(depsgraph, x=DRAW_PIXELS, y=DRAW_PIXELS)
+
+    turns = itertools.count()
+
+    def draw() -> float:
+        # A view that stands still is not drawn again, so each is a hair beside the last.
+        view.translation.x = 1e-5 * next(turns)
+        start = time.perf_counter()
+        target.draw_view3d(
+            rig.scene, bpy.context.view_layer, space, region, view, lens, do_color_management=False
+        )
+        with target.bind():  # reading a pixel waits for the drawing to end
+            gpu.state.active_framebuffer_get().read_color(0, 0, 1, 1, 4, 0, "FLOAT")
+        return time.perf_counter() - start
+
+    base = "Diffuse BSDF, 1 sun"
+    order = [base, *(name for name in contenders if name != base), base]
+    measured = []
+    for name in order:
+        contenders[name]()
+        bpy.context.view_layer.update()
+        first = draw()
+        measured.append((name, first, [draw() for _ in range(DRAWS)]))
+    reference = float(np.median([*measured[0][2], *measured[-1][2]]))
     rows: Rows = []
-    for name, spent_each in times.items():
-        least, middle, most = min(spent_each), float(np.median(spent_each)), max(spent_each)
-        row = [name, f"{least / base:.2f}", f"{least:.1f}", f"{middle:.1f}", f"{most:.1f}"]
-        rows.append([*row, f"{first[name]:.1f}"])
+    for name, first, times in measured:
+        low, middle, high = np.percentile(times, (10, 50, 90))
+        row = [
+            name,
+            f"{middle / reference:.2f}",
+            f"{low / reference:.2f} to {high / reference:.2f}",
+        ]
+        rows.append([*row, f"{middle:.3f}", f"{first:.0f}"])
     return (
-        f"A frame of 256 x 256, 8 samples: CPU time against the Diffuse BSDF ({ROUNDS} rounds)",
-        ["material", "ratio of the least", "least, CPU s", "median", "most", "first frame"],
+        f"A viewport draw of {DRAW_PIXELS} x {DRAW_PIXELS} pixels against the Diffuse BSDF",
+        ["material", "ratio, median", "10 % to 90 %", "s", "first draw with compilation, s"],
         rows,
     )
 
