@@ -32,9 +32,11 @@ if not __package__:  # run as a file: make the package importable, then go on in
 import bpy
 
 from cdrf_addon import compat, register, unregister
-from cdrf_addon.blender import display, setup, stage
+from cdrf_addon.blender import display, legend, setup, stage
 from cdrf_addon.blender.materials import cdrf_node
+from cdrf_addon.core.curvature import Options
 from cdrf_addon.core.errors import CdrfError, ParameterError, SceneError
+from cdrf_addon.core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
 
 VERSION = 1
 JOURNAL = "pictures.tsv"
@@ -180,6 +182,13 @@ def make_parser() -> argparse.ArgumentParser:
     add("--lambert", action="store_true", help="also render sigma0 = 0, and both side by side")
     add("--scale", type=_size, default=1.0, help="size of mesh files: 0.1 for decimetres")
     add("--subdivide", type=_count(0, 6), default=0, help="smooth subdivisions of mesh files")
+    add("--curvature", nargs="?", const="KAPPA", choices=list(display.QUANTITIES), metavar="WHAT",
+        help="also render the curvature in colours, with a legend: KAPPA (as measured, the "
+        "default), DIFFUSED (as rendered) or MEAN (signed)")  # fmt: skip
+    add("--method", choices=list(METHODS), help="estimate curvature anew, this way")
+    add(
+        "--rings", type=_count(2, 10), help="rings of neighbours in the estimate (3-5: noisy scans)"
+    )
     add("--save-blend", action="store_true", help="also save each prepared scene")
     add("--force", action="store_true", help="render again what is there already")
     add("--demo", action="store_true", help="the human head, Lambert beside CDRF")
@@ -260,12 +269,12 @@ def prepare(path: Path, options: argparse.Namespace, record: SceneRecord) -> Non
         record.warnings.append("The scene was set to stereo; rendered as one picture.")
         scene.render.use_multiview = False
     with record.stage("curvature and nodes"):
-        _make_translucent(record, mesh_file)
+        _make_translucent(record, mesh_file, options)
     for material in translucent_materials():
         _adjust(material, options, mesh_file, record)
 
 
-def _make_translucent(record: SceneRecord, mesh_file: bool) -> None:
+def _make_translucent(record: SceneRecord, mesh_file: bool, options: argparse.Namespace) -> None:
     layer = bpy.context.view_layer
     objects = setup.translucent_objects(layer)
     linked = sorted({m.name for item in layer.objects for m in setup.linked_skins(item)})
@@ -278,7 +287,7 @@ def _make_translucent(record: SceneRecord, mesh_file: bool) -> None:
         if not mesh_file:
             record.warnings.append("Nothing was translucent yet: every mesh was set up.")
     if objects or not linked:
-        job = setup.Setup(bpy.context, objects)
+        job = setup.Setup(bpy.context, objects, options=_measurement(options))
         shown = -1
         for part, what in job.steps():
             if int(part * 4) > shown:
@@ -289,6 +298,13 @@ def _make_translucent(record: SceneRecord, mesh_file: bool) -> None:
         record.warnings += report.warnings
 
 
+def _measurement(options: argparse.Namespace) -> Options | None:
+    """How to measure curvature; None if the command line leaves that to the file."""
+    if options.method is None and options.rings is None:
+        return None
+    return Options(options.method or DEFAULT_METHOD, options.rings or DEFAULT_RADIUS)
+
+
 def _adjust(
     material: bpy.types.Material, options: argparse.Namespace, mesh_file: bool, record: SceneRecord
 ) -> None:
@@ -297,7 +313,7 @@ def _adjust(
     assert node is not None
     if display.shows_curvature(material):
         record.warnings.append(f"'{material.name}' was showing its curvature; skin is rendered.")
-        display.show_skin(material)
+        display.hide(bpy.context.scene, [material])
     if options.ratio:
         material.cdrf.sigma0_ratio = options.ratio
     if options.sigma0 and _free(material, node.inputs["Sigma0"]):
@@ -375,6 +391,8 @@ def _render_all(
     scene = bpy.context.scene
     frames = options.frames or [scene.frame_current]
     own = {material.name: material.cdrf.sigma0 for material in translucent_materials()}
+    if options.curvature:
+        _render_curvature(options.output / f"{stem}_curvature.png", options, record)
     total = len(frames) * len(sigmas)
     for number, frame in enumerate(frames):
         scene.frame_set(frame)
@@ -409,6 +427,16 @@ def _render_all(
         _set_sigma0(own)
         saved = options.output / f"{stem}.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(saved.resolve()), copy=True)
+
+
+def _render_curvature(target: Path, options: argparse.Namespace, record: SceneRecord) -> None:
+    skins = setup.skins_of(bpy.context.view_layer)
+    if not skins:
+        record.warnings.append("Nothing here has a curvature to show.")
+        return
+    with record.stage("render curvature"):
+        legend.render_curvature(bpy.context.scene, skins, target, options.curvature)
+    say(f"  {target.name}")
 
 
 def _label(sigma: float | None) -> str:

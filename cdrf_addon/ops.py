@@ -3,23 +3,29 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Generator
+from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from . import ids
-from .blender import display, materials, state
+from .blender import display, legend, materials, state, viewport
 from .blender.mesh_io import remove_curvature
 from .blender.setup import (
     Report,
     Setup,
     remove_unused_groups,
+    skins_of,
+    skins_on,
     translucent_objects,
 )
-from .core.curvature import DEFAULT_RADIUS
+from .core.curvature import Options
 from .core.errors import CdrfError
+from .core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
+from .core.mesh import NO_CREASE
 
 # Meshes up to this size are done in under half a second; above it a progress bar comes up.
 MODAL_FROM_VERTICES = 15_000
@@ -135,6 +141,12 @@ class CDRF_OT_setup(_Job):
         description="Leave the object's other materials (eyes, teeth, cloth) as they are",
         default=False,
     )
+    method: EnumProperty(
+        name="Curvature",
+        description="How the curvature is estimated",
+        items=[(key, method.label, method.description) for key, method in METHODS.items()],
+        default=DEFAULT_METHOD,
+    )
     radius: IntProperty(
         name="Smoothing Rings",
         description=(
@@ -144,6 +156,17 @@ class CDRF_OT_setup(_Job):
         default=DEFAULT_RADIUS,
         min=2,
         max=10,
+    )
+    crease_angle: FloatProperty(
+        name="Split Creases",
+        description=(
+            "Do not let the curvature see across edges at which faces meet at a sharper angle than "
+            "this, so that a crease does not count as bent. 180 degrees splits nothing"
+        ),
+        subtype="ANGLE",
+        default=NO_CREASE,
+        min=math.radians(1.0),
+        max=NO_CREASE,
     )
     only_active_object: BoolProperty(
         name="Only Active Object",
@@ -162,7 +185,7 @@ class CDRF_OT_setup(_Job):
         return Setup(
             context,
             [context.object] if self.only_active_object else context.selected_objects,
-            radius=self.radius,
+            options=Options(self.method, self.radius, self.crease_angle),
             only_active_slot=self.only_active_slot,
             recompute=self.recompute,
         )
@@ -192,25 +215,29 @@ class CDRF_OT_remove(bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Go to Object Mode first (Tab)")
             return False
-        if not any(_skins(item) for item in context.selected_objects):
+        if not any(skins_on(item) for item in context.selected_objects):
             cls.poll_message_set("Select a translucent object")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        chosen = {skin for item in context.selected_objects for skin in _skins(item)}
+        chosen = {skin for item in context.selected_objects for skin in skins_on(item)}
         try:
             for material in chosen:
                 materials.require_editable(material)
         except CdrfError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        users = [item for item in context.scene.objects if chosen & set(_skins(item))]
+        users = [item for item in context.scene.objects if chosen & set(skins_on(item))]
         for material in chosen:
             display.show_skin(material)
             materials.remove(material)
+        rest = skins_of(context.view_layer)
+        if not any(display.shows_curvature(skin) for skin in rest):
+            display.hide(context.scene, ())
+            viewport.restore(context)
         for item in users:
-            if not _skins(item) and item.data.is_editable:
+            if not skins_on(item) and item.data.is_editable:
                 remove_curvature(item.data)
                 item.data.cdrf.fingerprint = ""
                 if ids.SCALE_KEY in item:
@@ -221,7 +248,7 @@ class CDRF_OT_remove(bpy.types.Operator):
 
 
 class CDRF_OT_show_curvature(bpy.types.Operator):
-    """Show the curvature in hot colours, white where it is sharpest, or the skin again"""
+    """Show the curvature in colours with a legend, or the skin again; green marks are filled in"""
 
     bl_idname = "cdrf.show_curvature"
     bl_label = "Show Curvature"
@@ -231,11 +258,17 @@ class CDRF_OT_show_curvature(bpy.types.Operator):
         name="Display",
         items=[
             ("TOGGLE", "Toggle", "Switch between curvature and skin"),
-            ("ON", "Curvature", "Hot colours for high curvature"),
+            ("ON", "Curvature", "Colours for curvature"),
             ("OFF", "Skin", "The translucent surface"),
         ],
         default="TOGGLE",
         options={"SKIP_SAVE"},
+    )
+    quantity: EnumProperty(
+        name="Quantity",
+        description="What is shown",
+        items=[(key, *texts) for key, texts in display.QUANTITIES.items()],
+        default="KAPPA",
     )
 
     @classmethod
@@ -246,33 +279,66 @@ class CDRF_OT_show_curvature(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = translucent_objects(context.view_layer)
-        skins: dict[bpy.types.Material, list[bpy.types.Mesh]] = {}
-        for item in objects:
-            for skin in _skins(item):
-                skins.setdefault(skin, []).append(item.data)
+        skins = skins_of(context.view_layer)
         showing = any(display.shows_curvature(skin) for skin in skins)
-        on = not showing if self.display == "TOGGLE" else self.display == "ON"
-        for skin, meshes in skins.items():
-            if on:
-                display.show_curvature(skin, meshes)
-            else:
-                display.show_skin(skin)
-        space = context.space_data
-        if on and space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
-            self.report({"INFO"}, "Switch the viewport to Rendered (Z) to see the curvature")
+        if self.display == "ON" or (self.display == "TOGGLE" and not showing):
+            display.show(context.scene, skins, self.quantity)
+            viewport.show_materials(context)
+        else:
+            display.hide(context.scene, skins)
+            viewport.restore(context)
         return {"FINISHED"}
 
 
-def _skins(item: bpy.types.Object) -> list[bpy.types.Material]:
-    return [
-        slot.material
-        for slot in item.material_slots
-        if item.type == "MESH" and materials.cdrf_node(slot.material) is not None
-    ]
+class CDRF_OT_save_curvature(bpy.types.Operator):
+    """Render the curvature in colours, with its legend, to a PNG; the scene stays as it is"""
+
+    bl_idname = "cdrf.save_curvature"
+    bl_label = "Save Curvature Picture"
+
+    filepath: StringProperty(name="File", subtype="FILE_PATH", default="//curvature.png")
+    quantity: EnumProperty(
+        name="Quantity",
+        description="What is shown",
+        items=[(key, *texts) for key, texts in display.QUANTITIES.items()],
+        default="KAPPA",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene.camera is None:
+            cls.poll_message_set("The scene has no camera; add one first")
+            return False
+        return CDRF_OT_show_curvature.poll.__func__(cls, context)  # type: ignore[attr-defined]
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        path = Path(bpy.path.abspath(self.filepath))
+        if not path.is_absolute():
+            self.report({"ERROR"}, "Save the file first, or choose a folder for the picture.")
+            return {"CANCELLED"}
+        path = path.with_suffix(".png")
+        try:
+            legend.render_curvature(
+                context.scene, skins_of(context.view_layer), path, self.quantity
+            )
+        except (CdrfError, OSError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"CDRF: curvature saved as {path}")
+        return {"FINISHED"}
 
 
-CLASSES = (CDRF_OT_setup, CDRF_OT_update, CDRF_OT_remove, CDRF_OT_show_curvature)
+CLASSES = (
+    CDRF_OT_setup,
+    CDRF_OT_update,
+    CDRF_OT_remove,
+    CDRF_OT_show_curvature,
+    CDRF_OT_save_curvature,
+)
 
 _HANDLERS = (
     ("depsgraph_update_post", state.note_touched),
@@ -288,10 +354,12 @@ def register() -> None:
         bpy.utils.register_class(cls)
     for name, handler in _HANDLERS:
         getattr(bpy.app.handlers, name).append(handler)
+    legend.register()
 
 
 def unregister() -> None:
     """Undo `register`."""
+    legend.unregister()
     for name, handler in reversed(_HANDLERS):
         getattr(bpy.app.handlers, name).remove(handler)
     for cls in reversed(CLASSES):

@@ -10,7 +10,8 @@ import bpy
 from . import ids
 from .blender import display, materials, shader, state
 from .compat import EEVEE
-from .core.summary import CONSTANT, FLAT
+from .core.estimators import METHODS
+from .core.summary import CONSTANT, FLAT, VARYING
 
 _MOST_LINES = 6
 
@@ -60,6 +61,32 @@ def draw_skin(
         _wrapped(layout, "Linked: make it local to change it.", _characters(context), "LINKED")
 
 
+def draw_display(
+    layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.types.Material
+) -> None:
+    """Draw the buttons that show curvature in colours, and the one that removes translucency."""
+    row = layout.row(align=True)
+    shown = display.shows_curvature(skin)
+    button = row.operator(
+        "cdrf.show_curvature",
+        text="Show Skin" if shown else "Show Curvature",
+        icon="HIDE_OFF",
+        depress=shown,
+    )
+    button.display = "OFF" if shown else "ON"
+    row.operator("cdrf.remove", text="", icon="TRASH")
+    kept = context.scene.get(ids.DISPLAY_KEY)
+    if not shown or kept is None:
+        return
+    row = layout.row(align=True)
+    for quantity, text in (("KAPPA", "Measured"), ("DIFFUSED", "Rendered"), ("MEAN", "Signed")):
+        button = row.operator(
+            "cdrf.show_curvature", text=text, depress=kept["quantity"] == quantity
+        )
+        button.display, button.quantity = "ON", quantity
+    row.operator("cdrf.save_curvature", text="", icon="RENDER_STILL")
+
+
 def draw_state(
     layout: bpy.types.UILayout, context: bpy.types.Context, item: bpy.types.Object
 ) -> None:
@@ -75,6 +102,9 @@ def draw_state(
         box.label(text=f"Curvature {known.low:.3g} to {known.high:.3g}", icon="SPHERECURVE")
         box.label(text=f"Median {known.median:.3g}, radius {1 / max(known.median, 1e-9):.3g}")
     box.label(text=f"{known.evaluated_vertices:,} vertices in {known.seconds:.2f} s", icon="TIME")
+    if known.kind == VARYING:
+        method = METHODS[known.method].label if known.method in METHODS else known.method
+        box.label(text=f"{method}, {known.radius} rings", icon="MOD_SMOOTH")
     for line in known.warnings.splitlines()[:_MOST_LINES]:
         _wrapped(box, line, width, "INFO")
     playing = bool(context.screen and context.screen.is_animation_playing)
@@ -121,15 +151,7 @@ class CDRF_PT_main(_View3D, bpy.types.Panel):
             layout.prop(context.scene.render, "engine", text="Render Engine")
         layout.label(text=skin.name, icon="MATERIAL")
         draw_skin(layout, context, skin)
-        row = layout.row(align=True)
-        shown = display.shows_curvature(skin)
-        row.operator(
-            "cdrf.show_curvature",
-            text="Show Skin" if shown else "Show Curvature",
-            icon="HIDE_OFF",
-            depress=shown,
-        )
-        row.operator("cdrf.remove", text="", icon="TRASH")
+        draw_display(layout, context, skin)
         draw_state(layout, context, item)
 
 

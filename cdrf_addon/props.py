@@ -19,6 +19,8 @@ from . import ids
 from .blender.materials import cdrf_node, install
 from .blender.setup import scene_of_group
 from .blender.shader import ensure_shader_group, stamped_variant, variant_of
+from .core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
+from .core.mesh import NO_CREASE
 from .core.summary import CONSTANT, FLAT, VARYING
 
 UNSET = -1.0
@@ -122,9 +124,12 @@ class CdrfMesh(bpy.types.PropertyGroup):
     low: FloatProperty(options={"HIDDEN"})
     median: FloatProperty(options={"HIDDEN"})
     high: FloatProperty(options={"HIDDEN"})
+    mean_high: FloatProperty(options={"HIDDEN"})
     mean_values: FloatVectorProperty(size=4, options={"HIDDEN"})
     metric: FloatVectorProperty(size=9, options={"HIDDEN"})
-    radius: IntProperty(default=2, options={"HIDDEN"})
+    method: StringProperty(default=DEFAULT_METHOD, options={"HIDDEN"})
+    radius: IntProperty(default=DEFAULT_RADIUS, options={"HIDDEN"})
+    crease_angle: FloatProperty(default=NO_CREASE, options={"HIDDEN"})
     vertices: IntProperty(options={"HIDDEN"})
     evaluated_vertices: IntProperty(options={"HIDDEN"})
     seconds: FloatProperty(options={"HIDDEN"})

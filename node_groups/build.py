@@ -31,7 +31,9 @@ DESCRIPTIONS = {
     "CDRF Area Ellipse": "Direction, radiance and blur of a disk light for CDRF Reflectance",
     "CDRF Reflectance RGB": "f(theta, sigma) of Kubo et al. 2011, one sigma for all channels",
     "CDRF Reflectance R+G+B": "f(theta, sigma) of Kubo et al. 2011, a sigma for each channel",
+    "CDRF Diffused Curvature": "Curvature at the length over which a channel's light diffuses",
     "CDRF Curvature Display": "Curvature in hot colours",
+    "CDRF Signed Curvature Display": "Curvature from blue hollows to red bulges",
 }
 
 
@@ -41,7 +43,8 @@ def build_all() -> list[bpy.types.ShaderNodeTree]:
     built = [groups.light_group(kind) for kind in ("SUN", "POINT", "SPOT")]
     built += [groups.area_group(elliptic=elliptic) for elliptic in (False, True)]
     built += [groups.reflectance_group(channels) for channels in groups.CHANNEL_SETS]
-    built.append(groups.display_group())
+    built.append(groups.diffused_group())
+    built += [groups.display_group(signed=signed) for signed in (False, True)]
     return built
 
 

@@ -19,12 +19,14 @@ from typing import Any
 import bpy
 
 from .. import ids
+from ..core.colour_scale import HOT, MARK_COLOUR, SIGNED
 from ..core.finite_light import VARIANCE_COEFFICIENTS
 from ..core.lut import DEFAULT_LAYOUT, VARIANCE_MAX
+from ..core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS
 from .image import ensure_lut_image
 from .nodetree import TreeBuilder, declare, ensure_group
 
-VERSION = 1
+VERSION = 2
 
 ELLIPTIC = {"DISK", "ELLIPSE"}
 
@@ -86,6 +88,39 @@ def reflectance_group(channels: str) -> bpy.types.ShaderNodeTree:
     parts = "+".join(channels.split())
     role = f"{ids.ROLE_REFLECTANCE} {channels}"
     return ensure_group(f"CDRF Reflectance {parts}", role, VERSION, build)
+
+
+def diffused_group() -> bpy.types.ShaderNodeTree:
+    """Kappa at the diffusion length that belongs to a sigma0 (core/scale_space.py).
+
+    Wiring, with c = LENGTH_PER_SIGMA0, q = LEVEL_RATIO and levels K0 to K3:
+
+        Sigma0 x c / Length -> max(., 1) -> log_q = t
+        K0 + clamp(t) (K1 - K0) + clamp(t - 1) (K2 - K1) + clamp(t - 2) (K3 - K2) -> Curvature
+    """
+
+    def build(b: TreeBuilder) -> None:
+        declare(b.tree, ids.LEVELS, "Color", tip="Curvature at the first three lengths")
+        declare(b.tree, ids.LEVELS_ALPHA, tip="Curvature at the longest length")
+        declare(b.tree, ids.LENGTH, default=1.0, tip="The shortest length")
+        declare(b.tree, ids.SIGMA0, default=0.0, tip="Scatter distance of the channel")
+        declare(b.tree, ids.CURVATURE, output=True)
+        given, result = _ends(b)
+        length = b.math("MULTIPLY", given[ids.SIGMA0], LENGTH_PER_SIGMA0)
+        ratio = b.math("MAXIMUM", b.math("DIVIDE", length, given[ids.LENGTH]), 1.0)
+        place = b.math("LOGARITHM", ratio, LEVEL_RATIO)
+        parts = b.node("ShaderNodeSeparateColor")
+        b.feed(parts.inputs["Color"], given[ids.LEVELS])
+        levels = [parts.outputs[name] for name in ("Red", "Green", "Blue")]
+        levels.append(given[ids.LEVELS_ALPHA])
+        kappa = levels[0]
+        for step in range(LEVELS - 1):
+            rise = b.math("SUBTRACT", levels[step + 1], levels[step])
+            part = b.math("SUBTRACT", place, float(step), clamp=True)
+            kappa = b.math("MULTIPLY_ADD", part, rise, kappa)
+        b.feed(result[ids.CURVATURE], kappa)
+
+    return ensure_group("CDRF Diffused Curvature", ids.ROLE_DIFFUSED, VERSION, build)
 
 
 def _declare_light(tree: bpy.types.ShaderNodeTree) -> None:
@@ -296,13 +331,15 @@ def light_group(kind: str) -> bpy.types.ShaderNodeTree:
     return {"SUN": sun_group, "POINT": point_group, "SPOT": spot_group}[kind]()
 
 
-def display_group() -> bpy.types.ShaderNodeTree:
-    """Curvature in hot colours (paper, Fig. 3a): black, red, yellow, white from low to high."""
+def display_group(*, signed: bool) -> bpy.types.ShaderNodeTree:
+    """Curvature in colours (paper, Fig. 3a), from Minimum to Maximum; green where Mark is 1."""
+    scale = SIGNED if signed else HOT
 
     def build(b: TreeBuilder) -> None:
-        declare(b.tree, ids.CURVATURE, default=0.0, tip="Curvature kappa")
-        declare(b.tree, ids.MINIMUM, default=0.0, tip="Shown black")
-        declare(b.tree, ids.MAXIMUM, default=1.0, tip="Shown white")
+        declare(b.tree, ids.CURVATURE, default=0.0, tip="Curvature, signed or not")
+        declare(b.tree, ids.MINIMUM, default=0.0, tip="Shown in the first colour")
+        declare(b.tree, ids.MAXIMUM, default=1.0, tip="Shown in the last colour")
+        declare(b.tree, ids.MARK, default=0.0, tip="1 where the curvature was filled in")
         declare(b.tree, ids.SHADER, "Shader", output=True)
         given, result = _ends(b)
         part = b.node("ShaderNodeMapRange", clamp=True)
@@ -311,12 +348,18 @@ def display_group() -> bpy.types.ShaderNodeTree:
         b.feed(part.inputs["From Max"], given[ids.MAXIMUM])
         ramp = b.node("ShaderNodeValToRGB")
         stops = ramp.color_ramp.elements
-        for position, colour in ((1 / 3, (1, 0, 0, 1)), (2 / 3, (1, 1, 0, 1))):
-            stops.new(position).color = colour
-        stops[0].color, stops[-1].color = (0, 0, 0, 1), (1, 1, 1, 1)
+        for _ in range(len(scale) - 2):
+            stops.new(0.5)
+        for stop, (position, colour) in zip(stops, scale, strict=True):
+            stop.position, stop.color = position, (*colour, 1.0)
         b.feed(ramp.inputs["Fac"], part.outputs["Result"])
+        marked = b.math("GREATER_THAN", given[ids.MARK], 0.5)
+        kept = b.vector("SCALE", ramp.outputs["Color"], scale=b.math("SUBTRACT", 1.0, marked))
+        green = b.vector("SCALE", MARK_COLOUR, scale=marked)
         emission = b.node("ShaderNodeEmission")
-        b.feed(emission.inputs["Color"], ramp.outputs["Color"])
+        b.feed(emission.inputs["Color"], b.vector("ADD", kept, green))
         b.feed(result[ids.SHADER], emission.outputs["Emission"])
 
-    return ensure_group("CDRF Curvature Display", ids.ROLE_DISPLAY, VERSION, build)
+    name = "CDRF Signed Curvature Display" if signed else "CDRF Curvature Display"
+    role = f"{ids.ROLE_DISPLAY} signed" if signed else ids.ROLE_DISPLAY
+    return ensure_group(name, role, VERSION, build)

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from .. import ids
+from ..core.curvature import Options
 from ..core.errors import MeshError
 from ..core.mesh import TriMesh, edge_lengths
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Bumped when the same mesh would give another curvature.
-ESTIMATOR_VERSION = 1
+ESTIMATOR_VERSION = 2
 ORIGIN_ATTRIBUTE = ".cdrf_origin"
 
 
@@ -80,7 +81,7 @@ def base_fingerprint(mesh: bpy.types.Mesh) -> str:
     return _digest(positions(mesh).tobytes(), corner_vertices(mesh).tobytes())
 
 
-def read_shape(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph, radius: int) -> Shape:
+def read_shape(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: Options) -> Shape:
     """Read an object's evaluated surface in world size.
 
     Raises:
@@ -107,6 +108,7 @@ def read_shape(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph, radius: i
         mesh.loop_triangles.foreach_get("vertices", triangles)
     finally:
         evaluated.to_mesh_clear()
+    local_fingerprint = _digest(local.tobytes(), triangles.tobytes())
     faces = triangles.reshape(-1, 3)
     if np.linalg.det(linear) < 0.0:
         faces = faces[:, ::-1]  # a mirrored object keeps its outside
@@ -114,11 +116,11 @@ def read_shape(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph, radius: i
     # Rounded, so that turning an object, which changes the last digits, recomputes nothing.
     rounded = np.round(metric / np.trace(metric), 6) + 0.0
     size = float(f"{np.trace(metric):.6g}")
-    local_fingerprint = _digest(local.tobytes(), np.ascontiguousarray(faces).tobytes())
     fingerprint = _digest(
         local_fingerprint.encode(),
         rounded.tobytes(),
-        repr((size, radius, ESTIMATOR_VERSION)).encode(),
+        repr((size, options.method, options.radius, ESTIMATOR_VERSION)).encode(),
+        f"{options.crease_angle:.5g}".encode(),
     )
     with np.errstate(invalid="ignore", over="ignore"):
         world = local.astype(np.float64) @ linear.T
@@ -152,9 +154,9 @@ def evaluable(
 
 def coordinate_noise(mesh: TriMesh) -> float:
     """Curvature that the rounding of float32 positions alone may feign: rounding / edge^2."""
-    used = mesh.vertices[mesh.triangles[:, 0]]
-    largest = float(np.median(np.abs(used).max(axis=1)))
-    edge = float(np.median(edge_lengths(mesh.vertices, mesh.triangles)))
+    some = mesh.triangles[:: max(1, len(mesh.triangles) // 10_000)]
+    largest = float(np.median(np.abs(mesh.vertices[some[:, 0]]).max(axis=1)))
+    edge = float(np.median(edge_lengths(mesh.vertices, some)))
     return largest * float(np.finfo(np.float32).eps) / edge**2 if edge > 0.0 else 0.0
 
 
@@ -211,10 +213,10 @@ def to_original_vertices(
     Args:
         item: The object.
         depsgraph: Its dependency graph.
-        values: (number of evaluated vertices, 4).
+        values: (number of evaluated vertices, k).
 
     Returns:
-        (number of original vertices, 4), and how many had to take the nearest.
+        (number of original vertices, k), and how many had to take the nearest.
     """
     mesh = item.data
     count = len(mesh.vertices)
@@ -224,7 +226,7 @@ def to_original_vertices(
         known = origin >= 0
         total = np.bincount(origin[known], minlength=count)
         carried = np.stack(
-            [np.bincount(origin[known], values[known, i], minlength=count) for i in range(4)], 1
+            [np.bincount(origin[known], part[known], minlength=count) for part in values.T], 1
         )
     result = (carried / np.maximum(total, 1)[:, None]).astype(np.float32)
     lost = np.flatnonzero(total == 0)
@@ -257,38 +259,71 @@ def _only_deforms(item: bpy.types.Object, evaluated_count: int) -> bool:
     )
 
 
-def write_curvature(mesh: bpy.types.Mesh, values: NDArray[np.float32]) -> None:
-    """Store kappa, k1, k2, signed mean, (n, 4), as the FLOAT_COLOR point attribute."""
-    attribute = mesh.attributes.get(ids.CURVATURE_ATTRIBUTE)
-    if attribute is not None and (
-        attribute.data_type != "FLOAT_COLOR" or attribute.domain != "POINT"
-    ):
-        mesh.attributes.remove(attribute)
-        attribute = None
-    if attribute is None:
-        # The first colour attribute of a mesh becomes the one to paint on: leave that as it was.
-        active = mesh.color_attributes.active_color_name
-        render = mesh.color_attributes.render_color_index
-        attribute = mesh.attributes.new(ids.CURVATURE_ATTRIBUTE, "FLOAT_COLOR", "POINT")
-        if active and render >= 0:
-            mesh.color_attributes.active_color_name = active
-            mesh.color_attributes.render_color_index = render
-        attribute = mesh.attributes[ids.CURVATURE_ATTRIBUTE]
-    attribute.data.foreach_set("color", np.ascontiguousarray(values, dtype=np.float32).ravel())
+def write_curvature(
+    mesh: bpy.types.Mesh,
+    principal: NDArray[np.float32],
+    levels: NDArray[np.float32],
+    finest: float,
+) -> None:
+    """Store a mesh's curvature.
+
+    Args:
+        mesh: The mesh.
+        principal: (n, 4) kappa, k1, k2, signed mean.
+        levels: (n, 4) kappa at four diffusion lengths.
+        finest: The shortest of those lengths, in world units.
+    """
+    _write_colours(mesh, ids.CURVATURE_ATTRIBUTE, principal)
+    _write_colours(mesh, ids.DIFFUSED_ATTRIBUTE, levels)
+    mesh[ids.LENGTH_KEY] = finest
     mesh.update_tag()
 
 
-def remove_curvature(mesh: bpy.types.Mesh) -> None:
-    """Take the attribute off a mesh that does not need it."""
-    attribute = mesh.attributes.get(ids.CURVATURE_ATTRIBUTE)
+def mark_filled(mesh: bpy.types.Mesh, filled: NDArray[np.bool_]) -> None:
+    """Mark the vertices whose curvature comes from their neighbours; no mark, no attribute."""
+    attribute = mesh.attributes.get(ids.FILLED_ATTRIBUTE)
     if attribute is not None:
         mesh.attributes.remove(attribute)
-        mesh.update_tag()
+    if filled.any():
+        attribute = mesh.attributes.new(ids.FILLED_ATTRIBUTE, "FLOAT", "POINT")
+        attribute.data.foreach_set("value", filled.astype(np.float32))
+
+
+def _write_colours(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32]) -> None:
+    if name in mesh.attributes and not _holds_colours(mesh, name):
+        mesh.attributes.remove(mesh.attributes[name])
+    if name not in mesh.attributes:
+        # The first colour attribute of a mesh becomes the one to paint on: leave that as it was.
+        active = mesh.color_attributes.active_color_name
+        render = mesh.color_attributes.render_color_index
+        mesh.attributes.new(name, "FLOAT_COLOR", "POINT")
+        if active and render >= 0:
+            mesh.color_attributes.active_color_name = active
+            mesh.color_attributes.render_color_index = render
+    colours = np.ascontiguousarray(values, dtype=np.float32).ravel()
+    mesh.attributes[name].data.foreach_set("color", colours)
+
+
+def remove_curvature(mesh: bpy.types.Mesh) -> None:
+    """Take the attributes off a mesh that does not need them."""
+    for name in (ids.CURVATURE_ATTRIBUTE, ids.DIFFUSED_ATTRIBUTE, ids.FILLED_ATTRIBUTE):
+        attribute = mesh.attributes.get(name)
+        if attribute is not None:
+            mesh.attributes.remove(attribute)
+            mesh.update_tag()
+    if ids.LENGTH_KEY in mesh:
+        del mesh[ids.LENGTH_KEY]
 
 
 def has_curvature(mesh: bpy.types.Mesh) -> bool:
-    """Tell whether a mesh carries the attribute in the form the shader reads."""
-    attribute = mesh.attributes.get(ids.CURVATURE_ATTRIBUTE)
+    """Tell whether a mesh carries the attributes in the form the shader reads."""
+    return ids.LENGTH_KEY in mesh and all(
+        _holds_colours(mesh, name) for name in (ids.CURVATURE_ATTRIBUTE, ids.DIFFUSED_ATTRIBUTE)
+    )
+
+
+def _holds_colours(mesh: bpy.types.Mesh, name: str) -> bool:
+    attribute = mesh.attributes.get(name)
     return (
         attribute is not None
         and attribute.data_type == "FLOAT_COLOR"

@@ -17,10 +17,25 @@ import numpy as np
 
 from .. import ids
 from ..compat import EEVEE
-from ..core.curvature import DEFAULT_RADIUS, curvature_steps
+from ..core.curvature import (
+    DEFAULT_OPTIONS,
+    CleanCurvature,
+    Options,
+    curvature_steps,
+)
 from ..core.errors import CdrfError, DependencyError, SceneError
+from ..core.facets import is_faceted
+from ..core.progress import portion
+from ..core.scale_space import LEVELS, level_steps
 from ..core.sphere import sphere_curvature
-from ..core.summary import CONSTANT, FLAT, CurvatureSummary, summarise
+from ..core.summary import (
+    CONSTANT,
+    FLAT,
+    FLAT_SUMMARY,
+    VARYING,
+    CurvatureSummary,
+    summarise,
+)
 from . import display, shader, state
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
@@ -30,6 +45,7 @@ from .mesh_io import (
     coordinate_noise,
     evaluable,
     has_curvature,
+    mark_filled,
     read_shape,
     remove_curvature,
     to_original_vertices,
@@ -81,8 +97,11 @@ class _MeshWork:
     summary: CurvatureSummary | None = None
     """None where nothing had to be computed."""
     values: NDArray[np.float32] | None = None
+    """(n, 9): kappa, k1, k2, signed mean, kappa at four diffusion lengths, and 1 where filled."""
+    finest: float = 1.0
+    """The shortest of those lengths."""
     evaluated_vertices: int = 0
-    radius: int = DEFAULT_RADIUS
+    options: Options = DEFAULT_OPTIONS
     seconds: float = 0.0
     warnings: list[str] = field(default_factory=list)
 
@@ -105,7 +124,7 @@ class Setup:
     Args:
         context: For the scene, the view layer and the dependency graph.
         objects: What to work on; other users of the same materials are included by themselves.
-        radius: Rings of the curvature fit; None keeps what each mesh was measured with.
+        options: How to measure curvature; None keeps how each mesh was measured before.
         only_active_slot: Convert an object's active material slot only.
         convert: False to leave materials alone that are not translucent yet.
         recompute: True to estimate the curvature even where nothing has changed.
@@ -119,7 +138,7 @@ class Setup:
         context: bpy.types.Context,
         objects: Iterable[bpy.types.Object],
         *,
-        radius: int | None = None,
+        options: Options | None = None,
         only_active_slot: bool = False,
         convert: bool = True,
         recompute: bool = False,
@@ -127,7 +146,7 @@ class Setup:
         self.scene = context.scene
         self.view_layer = context.view_layer
         self.depsgraph = context.evaluated_depsgraph_get()
-        self.radius = radius
+        self.options = options
         self.recompute = recompute
         self.report = Report()
         self.slots: list[bpy.types.MaterialSlot] = []
@@ -149,6 +168,12 @@ class Setup:
                         f"'{item.name}' is not a mesh: convert it first (Object > Convert > Mesh)."
                     )
                 continue
+            if (
+                not convert
+                and item.hide_render
+                and not item.visible_get(view_layer=self.view_layer)
+            ):
+                continue  # nobody sees it
             if item.mode == "EDIT":
                 raise SceneError(f"'{item.name}' is in Edit Mode: leave it first (Tab).")
             self.objects.append(item)
@@ -171,6 +196,8 @@ class Setup:
     def _nothing_to_do(self, convert: bool) -> str:
         if convert:
             return "No mesh object is selected: click the object that should become translucent."
+        if translucent_objects(self.view_layer):
+            return "Every translucent object is hidden: show one and update again."
         if any(linked_skins(item) for item in self.view_layer.objects):
             return (
                 "The translucent materials here are linked from another file: update them there, "
@@ -231,11 +258,11 @@ class Setup:
     def _compute(self, work: _MeshWork) -> Generator[float, None, None]:
         start = time.perf_counter()
         first, *others = work.users
-        work.radius = self.radius or work.mesh.cdrf.radius
+        work.options = self.options or known_options(work.mesh)
         with evaluable(work.users, self.view_layer, self.depsgraph):
-            shape = read_shape(first, self.depsgraph, work.radius)
+            shape = read_shape(first, self.depsgraph, work.options)
             for other in others:
-                work.sizes[other.name] = self._relative_size(other, shape, first, work.radius)
+                work.sizes[other.name] = self._relative_size(other, shape, first, work.options)
         work.sizes[first.name] = 1.0
         work.fingerprint = shape.fingerprint
         work.metric = shape.metric
@@ -246,18 +273,12 @@ class Setup:
             yield 1.0
             return
         try:
-            field_ = sphere_curvature(shape.mesh)
-            if field_ is None:
-                field_ = yield from curvature_steps(shape.mesh, work.radius)
+            values = yield from self._measure(work, shape)
         except CdrfError as error:
             raise type(error)(f"'{first.name}': {error}") from error
-        work.summary = summarise(shape.mesh, field_)
-        work.warnings = field_.sentences()
-        values = np.stack((field_.kappa, field_.k1, field_.k2, field_.mean), axis=1)
-        limit = np.finfo(np.float32).max
-        stored = np.clip(values, -limit, limit).astype(np.float32)
+        assert work.summary is not None
         with evaluable(work.users, self.view_layer, self.depsgraph):
-            work.values, lost = to_original_vertices(first, self.depsgraph, stored)
+            work.values, lost = to_original_vertices(first, self.depsgraph, values)
         if lost == len(work.mesh.vertices):
             raise SceneError(
                 f"'{first.name}' has a modifier that replaces the whole mesh (Remesh, Skin, some "
@@ -276,10 +297,33 @@ class Setup:
             )
         work.seconds = time.perf_counter() - start
 
+    def _measure(
+        self, work: _MeshWork, shape: Shape
+    ) -> Generator[float, None, NDArray[np.float32]]:
+        """Measure and sum up a shape's curvature; return what is stored, (n, 9)."""
+        if is_faceted(shape.mesh):
+            work.summary = FLAT_SUMMARY
+            return np.zeros((len(shape.mesh.vertices), 4 + LEVELS + 1), dtype=np.float32)
+        cleaned: CleanCurvature | None = None
+        found = sphere_curvature(shape.mesh)
+        if found is None:
+            cleaned = yield from portion(curvature_steps(shape.mesh, work.options), 0.0, 0.75)
+            found = cleaned.on_source()
+        work.summary = summarise(shape.mesh, found)
+        work.warnings = found.sentences()
+        principal = np.stack((found.kappa, found.k1, found.k2, found.mean), axis=1)
+        levels = np.repeat(found.kappa[:, None], LEVELS, axis=1)
+        if cleaned is not None and work.summary.kind == VARYING:
+            diffused = yield from portion(level_steps(cleaned), 0.75, 1.0)
+            levels, work.finest = diffused.values, diffused.finest
+        limit = np.finfo(np.float32).max
+        values = np.concatenate((principal, levels, found.filled[:, None]), axis=1)
+        return np.clip(values, -limit, limit).astype(np.float32)
+
     def _relative_size(
-        self, other: bpy.types.Object, shape: Shape, first: bpy.types.Object, radius: int
+        self, other: bpy.types.Object, shape: Shape, first: bpy.types.Object, options: Options
     ) -> float:
-        factor = read_shape(other, self.depsgraph, radius).size_relative_to(shape)
+        factor = read_shape(other, self.depsgraph, options).size_relative_to(shape)
         if factor is None:
             raise SceneError(
                 f"'{other.name}' and '{first.name}' share a mesh, but modifiers or scale give them "
@@ -302,6 +346,7 @@ class Setup:
             self._store(work, sources)
         for material, source in sources.items():
             self._install(material, source, lights)
+        display.refresh(self.scene, skins_of(self.view_layer))
         remove_unused_groups()
         self._sum_up(lights, sources)
         return self.report
@@ -342,11 +387,14 @@ class Setup:
         if not read & {shader.ATTRIBUTE, shader.SCALED}:
             remove_curvature(work.mesh)
         elif work.values is not None:
-            write_curvature(work.mesh, work.values)
+            principal, levels, filled = np.split(work.values, (4, 4 + LEVELS), axis=1)
+            write_curvature(work.mesh, principal, levels, work.finest)
+            mark_filled(work.mesh, filled[:, 0] > 0.5)
         elif not has_curvature(work.mesh):
             # A constant mesh that now shares its material with one that is not.
             constant = np.array(work.mean_values, dtype=np.float32)
-            write_curvature(work.mesh, np.tile(constant, (len(work.mesh.vertices), 1)))
+            principal = np.tile(constant, (len(work.mesh.vertices), 1))
+            write_curvature(work.mesh, principal, np.repeat(principal[:, :1], LEVELS, axis=1), 1.0)
         for item in work.users:
             scaled = any(sources.get(m) == shader.SCALED for m in _materials(item))
             if scaled:
@@ -371,8 +419,6 @@ class Setup:
         if source == shader.CONSTANT:
             kappas = [item.mean_values[0] for item in work]
             node.inputs[ids.CURVATURE].default_value = float(np.mean(kappas))
-        if display.shows_curvature(material):
-            display.show_curvature(material, [item.mesh for item in work])
 
     def _sum_up(self, lights: list[SceneLight], sources: dict[bpy.types.Material, str]) -> None:
         report = self.report
@@ -421,6 +467,24 @@ def translucent_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Objec
     ]
 
 
+def skins_on(item: bpy.types.Object) -> list[bpy.types.Material]:
+    """List the translucent materials of an object, slot by slot."""
+    return [
+        slot.material
+        for slot in item.material_slots
+        if item.type == "MESH" and cdrf_node(slot.material) is not None
+    ]
+
+
+def skins_of(layer: bpy.types.ViewLayer) -> dict[bpy.types.Material, list[bpy.types.Mesh]]:
+    """List the translucent materials of a view layer, each with the meshes that show it."""
+    skins: dict[bpy.types.Material, list[bpy.types.Mesh]] = {}
+    for item in translucent_objects(layer):
+        for skin in skins_on(item):
+            skins.setdefault(skin, []).append(item.data)
+    return skins
+
+
 def linked_skins(item: bpy.types.Object) -> list[bpy.types.Material]:
     """List the translucent materials of an object that another file owns."""
     return [m for m in _materials(item) if cdrf_node(m) is not None and not m.is_editable]
@@ -466,6 +530,12 @@ def _first_sigma0(work: list[_MeshWork]) -> float:
     return float(f"{FIRST_SIGMA / float(np.median(medians)):.2g}")
 
 
+def known_options(mesh: bpy.types.Mesh) -> Options:
+    """How a mesh's curvature was measured the last time."""
+    known = mesh.cdrf
+    return Options(known.method, known.radius, known.crease_angle)
+
+
 def _remember(work: _MeshWork) -> None:
     known, summary = work.mesh.cdrf, work.summary
     assert summary is not None and work.metric is not None
@@ -473,9 +543,12 @@ def _remember(work: _MeshWork) -> None:
     known.base_fingerprint = base_fingerprint(work.mesh)
     known.kind = summary.kind
     known.low, known.median, known.high = summary.low, summary.median, summary.high
+    known.mean_high = summary.mean_high
     known.mean_values = summary.mean_values
     known.metric = work.metric.ravel()
-    known.radius = work.radius
+    known.method = work.options.method
+    known.radius = work.options.radius
+    known.crease_angle = work.options.crease_angle
     known.vertices = len(work.mesh.vertices)
     known.evaluated_vertices = work.evaluated_vertices
     known.seconds = work.seconds

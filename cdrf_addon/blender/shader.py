@@ -4,7 +4,8 @@
 A variant is made for each way of having curvature and of sharing sigma0 between channels; the
 branches are one per light. Wiring:
 
-    attribute kappa -> x Sigma0 x Ratio -> squared = variance --------+
+    attribute levels -> kappa at the channel's length                 |
+                     -> x Sigma0 x Ratio -> squared = variance --------+
     Normal (or geometry) --+                                          |
     light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance
             -> Radiance ------------------------------> x f --> sum over i --> x Base Color
@@ -20,11 +21,11 @@ from typing import Any
 import bpy
 
 from .. import ids
-from .groups import light_group, reflectance_group
+from .groups import diffused_group, light_group, reflectance_group
 from .lights import SceneLight, drive_light
 from .nodetree import TreeBuilder, declare, is_intact, rebuild
 
-VERSION = 2
+VERSION = 3
 
 FLAT, CONSTANT, ATTRIBUTE, SCALED = "flat", "constant", "attribute", "scaled attribute"
 """Where kappa comes from: nowhere, the Curvature input, the mesh, the mesh and the object."""
@@ -220,21 +221,58 @@ def _skin_variance(b: TreeBuilder, variant: Variant, given: Any) -> Any:
     if variant.source == FLAT:
         return (0.0, 0.0, 0.0)
     if variant.source == CONSTANT:
-        kappa = given[ids.CURVATURE]
+        sigma = b.math("MULTIPLY", given[ids.SIGMA0], given[ids.CURVATURE])
+        width = b.vector("SCALE", given[ids.SIGMA0_RATIO], scale=sigma)
     else:
-        kappa = curvature_nodes(b, scaled=variant.source == SCALED)
-    sigma = b.math("MULTIPLY", given[ids.SIGMA0], kappa)
-    width = b.vector("SCALE", given[ids.SIGMA0_RATIO], scale=sigma)
+        width = _diffused_sigma(b, variant, given)
     return b.vector("MULTIPLY", width, width)
 
 
-def curvature_nodes(b: TreeBuilder, *, scaled: bool) -> Any:
-    """Kappa from the mesh; where objects of several sizes share it, corrected by the object's."""
+def _diffused_sigma(b: TreeBuilder, variant: Variant, given: Any) -> Any:
+    """Sigma per channel, each from the curvature at the channel's own diffusion length."""
+    levels = level_nodes(b)
+    sigma0 = given[ids.SIGMA0]
+    if variant.source == SCALED:
+        # An object twice as large is the measured one seen with half the scatter distance.
+        sigma0 = b.math("MULTIPLY", sigma0, size_node(b))
+    ratio = dict(zip("RGB", b.separate(given[ids.SIGMA0_RATIO]), strict=True))
+    sigma = {}
+    for shared in variant.channels.split():
+        own = b.math("MULTIPLY", sigma0, ratio[shared[0]])
+        sigma.update(dict.fromkeys(shared, b.math("MULTIPLY", own, diffused_node(b, levels, own))))
+    return b.combine(sigma["R"], sigma["G"], sigma["B"])
+
+
+def level_nodes(b: TreeBuilder) -> dict[str, Any]:
+    """What a mesh stores of its diffused curvature, by the sockets of `diffused_group`."""
+    levels = b.node("ShaderNodeAttribute", attribute_name=ids.DIFFUSED_ATTRIBUTE)
+    length = b.node("ShaderNodeAttribute", attribute_type="OBJECT", attribute_name=ids.LENGTH_KEY)
+    return {
+        ids.LEVELS: levels.outputs["Color"],
+        ids.LEVELS_ALPHA: levels.outputs["Alpha"],
+        ids.LENGTH: length.outputs["Fac"],
+    }
+
+
+def diffused_node(b: TreeBuilder, levels: dict[str, Any], sigma0: Any) -> Any:
+    """Kappa at the diffusion length of a sigma0, both in the measured mesh's size."""
+    node = b.group(diffused_group(), "Diffused Curvature", **levels, Sigma0=sigma0)
+    return node.outputs[ids.CURVATURE]
+
+
+def size_node(b: TreeBuilder) -> Any:
+    """Size of the mesh as measured over the size of this object."""
+    return b.node(
+        "ShaderNodeAttribute", attribute_type="OBJECT", attribute_name=ids.SCALE_KEY
+    ).outputs["Fac"]
+
+
+def curvature_nodes(b: TreeBuilder, *, scaled: bool, signed: bool) -> Any:
+    """Kappa or signed mean from the mesh; where objects of several sizes share it, corrected."""
     attribute = b.node("ShaderNodeAttribute", attribute_name=ids.CURVATURE_ATTRIBUTE)
-    parts = b.node("ShaderNodeSeparateColor")
-    b.feed(parts.inputs["Color"], attribute.outputs["Color"])
-    kappa = parts.outputs["Red"]
-    if not scaled:
-        return kappa
-    size = b.node("ShaderNodeAttribute", attribute_type="OBJECT", attribute_name=ids.SCALE_KEY)
-    return b.math("MULTIPLY", kappa, size.outputs["Fac"])
+    value = attribute.outputs["Alpha"]
+    if not signed:
+        parts = b.node("ShaderNodeSeparateColor")
+        b.feed(parts.inputs["Color"], attribute.outputs["Color"])
+        value = parts.outputs["Red"]
+    return b.math("MULTIPLY", value, size_node(b)) if scaled else value

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .errors import MeshError
+from .progress import run_steps
+from .topology import face_normals
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -22,12 +25,12 @@ if TYPE_CHECKING:
     Points = NDArray[np.float64]
     Indices = NDArray[np.int64]
 
-Result = TypeVar("Result")
-
 # A triangle flatter than this (height / longest edge) has no usable normal in float32 coordinates.
 FLATNESS_LIMIT = 1e-6
 # A face this many times the median edge belongs to a vertex that has flown off.
 EDGE_LIMIT = 1e6
+# Faces never meet at this angle: nothing is split.
+NO_CREASE = np.pi
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,7 @@ class CleaningReport:
     flipped_faces: int = 0
     non_orientable: bool = False
     welded_vertices: int = 0
+    crease_vertices: int = 0
 
     def sentences(self) -> list[str]:
         """Describe for an artist what is worth knowing, a sentence each; empty on a good mesh."""
@@ -105,31 +109,39 @@ class CleanMesh:
     """Median edge length in the source's unit; curvature is divided by it on the way back."""
     source: Indices
     """(N,) welded vertex of each source vertex; -1 where it belongs to no usable face."""
+    part_of: Indices
+    """(n,) welded vertex of each vertex; some have several parts where creases split the mesh."""
     seam: NDArray[np.bool_]
     """(n,) True where neighbouring faces cannot be wound alike (the seam of a Möbius strip)."""
     report: CleaningReport = field(default_factory=CleaningReport)
 
+    @cached_property
+    def face_normals(self) -> tuple[Points, Points]:
+        """Normals scaled by twice the faces' areas, (3, m), and those doubled areas, (m,)."""
+        return face_normals(self.vertices, self.triangles)
 
-def clean(mesh: TriMesh) -> CleanMesh:
+    def to_source(self, values: Points, loose: float = 0.0) -> Points:
+        """Carry values of the vertices, (n,), back to the source's, (N,); the mean of its parts."""
+        if len(self.part_of) and self.part_of[-1] + 1 < len(self.part_of):
+            parts = np.bincount(self.part_of)
+            values = np.bincount(self.part_of, values) / parts
+        return np.where(self.source >= 0, values[np.maximum(self.source, 0)], loose)
+
+
+def clean(mesh: TriMesh, crease_angle: float = NO_CREASE) -> CleanMesh:
     """Weld, filter, orient and normalise a mesh in one go; see `clean_steps`."""
-    return run_steps(clean_steps(mesh))
+    return run_steps(clean_steps(mesh, crease_angle))
 
 
-def run_steps(steps: Generator[Any, None, Result]) -> Result:
-    """Run a generator of steps to its end and return its result."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            result: Result = done.value
-            return result
-
-
-def clean_steps(mesh: TriMesh) -> Generator[None, None, CleanMesh]:
+def clean_steps(mesh: TriMesh, crease_angle: float = NO_CREASE) -> Generator[None, None, CleanMesh]:
     """Weld, filter, orient and normalise a mesh, pausing between the parts of the work.
+
+    The result does not depend on the order of the source's vertices: they are sorted along a
+    space-filling curve, which also keeps neighbours together in memory.
 
     Args:
         mesh: Any mesh; unchanged.
+        crease_angle: Split the surface where faces meet at a sharper angle than this, in radians.
 
     Returns:
         The mesh for the estimator and the way back.
@@ -144,17 +156,16 @@ def clean_steps(mesh: TriMesh) -> Generator[None, None, CleanMesh]:
         raise MeshError("The mesh has no faces, only loose vertices or edges; fill faces first.")
     finite = np.isfinite(mesh.vertices).all(axis=1)
     vertices, triangles = _drop_non_finite(mesh, finite, report)
-    vertices, edge = _normalise(vertices, triangles)
     yield
-    triangles = _drop_stray(vertices, triangles, report)
+    vertices, edge, lengths = _normalise(vertices, triangles)
+    yield
+    triangles = _drop_unusable(vertices, triangles, lengths, report)
     yield
     welded, first = weld(vertices)
-    yield
     report.welded_vertices = int(len(vertices) - len(first))
-    vertices, triangles = vertices[first], welded[triangles]
-    triangles = _drop_degenerate(vertices, triangles, report)
     yield
-    triangles = _drop_duplicates(triangles, report)
+    vertices = vertices[first]
+    triangles = _drop_duplicates(welded[triangles], len(vertices), report)
     yield
     if not len(triangles):
         raise MeshError(
@@ -162,19 +173,31 @@ def clean_steps(mesh: TriMesh) -> Generator[None, None, CleanMesh]:
             + (" ".join(report.sentences()) or "all of them are degenerate.")
             + ") Clean it up with Mesh > Clean Up or Merge by Distance."
         )
-    triangles, seam = _orient(triangles, len(vertices), report)
-    yield
     used = np.zeros(len(vertices), dtype=bool)
     used[triangles] = True
-    compact = np.where(used, np.cumsum(used) - 1, -1)
+    order = np.flatnonzero(used)[morton_order(vertices[used])]
+    place = np.full(len(vertices), -1, dtype=np.int64)
+    place[order] = np.arange(len(order))
+    yield
     source = np.full(len(mesh.vertices), -1, dtype=np.int64)
-    source[finite] = compact[welded]
+    source[finite] = place[welded]
+    vertices = vertices[order]
+    triangles = _canonical_faces(place[triangles], len(vertices))
+    yield
+    triangles, seam = _orient(triangles, len(vertices), report)
+    yield
+    part_of = np.arange(len(vertices))
+    if crease_angle < NO_CREASE:
+        triangles, part_of = split_creases(vertices, triangles, crease_angle)
+        report.crease_vertices = len(part_of) - len(vertices)
+        vertices, seam = vertices[part_of], seam[part_of]
     return CleanMesh(
-        np.ascontiguousarray(vertices[used]),
-        np.ascontiguousarray(compact[triangles]),
+        np.ascontiguousarray(vertices),
+        np.ascontiguousarray(triangles),
         edge,
         source,
-        seam[used],
+        part_of,
+        seam,
         report,
     )
 
@@ -205,9 +228,38 @@ def weld(vertices: Points) -> tuple[Indices, Indices]:
     return rank[group].astype(np.int64), first[order].astype(np.int64)
 
 
+def morton_order(vertices: Points) -> Indices:
+    """Order of the vertices along a space-filling curve (Morton 1966), (n,).
+
+    Equal cells are ordered by position, so that the order depends on nothing else.
+    """
+    low = vertices.min(axis=0)
+    span = max(float((vertices.max(axis=0) - low).max()), np.finfo(np.float64).tiny)
+    code = np.zeros(len(vertices), dtype=np.uint64)
+    for axis in range(3):
+        cell = ((vertices[:, axis] - low[axis]) * ((2**21 - 1) / span)).astype(np.uint64)
+        # Two zero bits between every two of the 21 bits.
+        for shift, mask in (
+            (32, 0x1F00000000FFFF),
+            (16, 0x1F0000FF0000FF),
+            (8, 0x100F00F00F00F00F),
+            (4, 0x10C30C30C30C30C3),
+            (2, 0x1249249249249249),
+        ):
+            cell = (cell | (cell << np.uint64(shift))) & np.uint64(mask)
+        code |= cell << np.uint64(axis)
+    order = np.argsort(code)
+    ranked = code[order]
+    if (ranked[1:] == ranked[:-1]).any():
+        order = np.lexsort((*vertices.T, code))
+    return order
+
+
 def _drop_non_finite(
     mesh: TriMesh, finite: NDArray[np.bool_], report: CleaningReport
 ) -> tuple[Points, Indices]:
+    if finite.all():
+        return mesh.vertices, mesh.triangles
     report.non_finite_vertices = int((~finite).sum())
     triangles = mesh.triangles[finite[mesh.triangles].all(axis=1)]
     if not len(triangles):
@@ -219,18 +271,31 @@ def _drop_non_finite(
 
 
 def edge_lengths(vertices: Points, triangles: Indices) -> Points:
-    """Length of the three edges of each triangle, shape (m, 3)."""
-    corners = vertices[triangles]
-    return np.asarray(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2))
+    """Length of the three edges of each triangle, shape (3, m)."""
+    x, y, z = np.ascontiguousarray(vertices.T)
+    square = np.empty((3, len(triangles)))
+    for side in range(3):
+        tail, head = triangles[:, side], triangles[:, (side + 1) % 3]
+        square[side] = (
+            (x[tail] - x[head]) ** 2 + (y[tail] - y[head]) ** 2 + (z[tail] - z[head]) ** 2
+        )
+    return np.sqrt(square)
 
 
-def _normalise(vertices: Points, triangles: Indices) -> tuple[Points, float]:
+def _normalise(vertices: Points, triangles: Indices) -> tuple[Points, float, Points]:
+    """Centre the vertices and divide them by their median edge.
+
+    Returns:
+        The vertices, the median edge, and the new lengths of all edges, (3, m).
+    """
     # Two steps, so that neither 1e300 nor 1e-300 overflows a square on the way.
-    used = vertices[triangles[:, 0]]
-    centred = vertices * 0.5 - np.median(used, axis=0) * 0.5
-    extent = float(np.median(np.abs(centred[triangles]).max(axis=(1, 2))))
+    used = np.zeros(len(vertices), dtype=bool)
+    used[triangles] = True
+    centred = vertices * 0.5 - np.median(vertices[used], axis=0) * 0.5
+    reach = np.abs(centred).max(axis=1)
+    extent = float(np.median(reach[triangles].max(axis=1)))
     if not extent > 0.0:
-        extent = float(np.abs(centred[triangles]).max())
+        extent = float(reach[triangles].max())
     if not extent > 0.0:
         raise MeshError("All faces shrink to one point; check the scale of the object.")
     with np.errstate(over="ignore"):
@@ -246,34 +311,97 @@ def _normalise(vertices: Points, triangles: Indices) -> tuple[Points, float]:
             f"Edges of {edge:.3g} units are outside what numbers can hold; "
             "check the scale of the object."
         )
-    return scaled / median, edge
+    return scaled / median, edge, lengths / median
 
 
-def _drop_stray(vertices: Points, triangles: Indices, report: CleaningReport) -> Indices:
-    with np.errstate(over="ignore"):  # an infinite length is as stray as any
-        stray = edge_lengths(vertices, triangles).max(axis=1) > EDGE_LIMIT
+def _drop_unusable(
+    vertices: Points, triangles: Indices, lengths: Points, report: CleaningReport
+) -> Indices:
+    """Drop faces that reach a vertex far away, and those without area."""
+    longest = lengths.max(axis=0)
+    stray = longest > EDGE_LIMIT
     report.stray_faces = int(stray.sum())
-    return triangles[~stray]
-
-
-def _drop_degenerate(vertices: Points, triangles: Indices, report: CleaningReport) -> Indices:
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    doubled_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    longest = edge_lengths(vertices, triangles).max(axis=1)
+    _, doubled_area = face_normals(vertices, triangles)
     good = doubled_area > FLATNESS_LIMIT * longest**2
-    report.degenerate_faces = int((~good).sum())
-    return triangles[good]
+    report.degenerate_faces = int((~good & ~stray).sum())
+    good &= ~stray
+    return triangles if good.all() else triangles[good]
 
 
-def _drop_duplicates(triangles: Indices, report: CleaningReport) -> Indices:
-    ordered = np.sort(triangles, axis=1)
-    order = np.lexsort(ordered.T)
-    ranked = ordered[order]
+def _drop_duplicates(triangles: Indices, count: int, report: CleaningReport) -> Indices:
+    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    middle = triangles.sum(axis=1) - low - high
+    if count < 2**21:
+        # One number a face; sorting tells at once that all are different, as they mostly are.
+        key = (low * count + middle) * count + high
+        ranked = np.sort(key)
+        if not (ranked[1:] == ranked[:-1]).any():
+            return triangles
+    order = np.lexsort((high, middle, low))
+    ordered = np.stack((low, middle, high), axis=1)[order]
     repeated = np.zeros(len(triangles), dtype=bool)
     # lexsort is stable, so the first of each run is the first in the mesh: it stays.
-    repeated[order[1:]] = (ranked[1:] == ranked[:-1]).all(axis=1)
+    repeated[order[1:]] = (ordered[1:] == ordered[:-1]).all(axis=1)
     report.duplicate_faces = int(repeated.sum())
     return triangles[~repeated]
+
+
+def split_creases(vertices: Points, triangles: Indices, angle: float) -> tuple[Indices, Indices]:
+    """Cut the surface open along its sharp edges.
+
+    Args:
+        vertices: (n, 3) positions.
+        triangles: (m, 3) consistently wound faces.
+        angle: Faces that meet at a sharper angle than this, in radians, are parted.
+
+    Returns:
+        Triangles in terms of the parts, (m, 3), and the vertex each part belongs to, (p,); the
+        first n parts are the vertices themselves.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    normal, area = face_normals(vertices, triangles)
+    normal = normal / area
+    face, other, corner, opposite = shared_edges(triangles, len(vertices))
+    smooth = (normal[:, face] * normal[:, other]).sum(axis=0) >= np.cos(angle)
+    face, other, corner, opposite = (array[smooth] for array in (face, other, corner, opposite))
+    # A corner of a face goes on over a smooth edge to the corner of the next at the same vertex.
+    following, preceding = (corner + 1) % 3, (opposite + 1) % 3
+    one = np.concatenate((3 * face + corner, 3 * face + following))
+    two = np.concatenate((3 * other + preceding, 3 * other + opposite))
+    size = 3 * len(triangles)
+    graph = coo_array((np.ones(len(one), dtype=np.int8), (one, two)), (size, size))
+    _, fan = connected_components(graph, directed=False)
+    # Fans are numbered by first corner; the first fan of a vertex keeps the vertex's number.
+    owner = np.zeros(fan.max() + 1, dtype=np.int64)
+    owner[fan] = triangles.ravel()
+    order = np.argsort(owner, kind="stable")
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = owner[order][1:] != owner[order][:-1]
+    number = np.empty(len(order), dtype=np.int64)
+    number[order[first]] = owner[order[first]]
+    number[order[~first]] = len(vertices) + np.arange(int((~first).sum()))
+    part_of = np.concatenate((np.arange(len(vertices)), owner[order[~first]]))
+    return number[fan].reshape(-1, 3), part_of
+
+
+def shared_edges(triangles: Indices, count: int) -> tuple[Indices, Indices, Indices, Indices]:
+    """List the edges of exactly two faces that are wound alike.
+
+    Returns:
+        The two faces of each, and the corner of each at which the edge starts.
+    """
+    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    key = np.minimum(tail, head) * count + np.maximum(tail, head)
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    start = np.flatnonzero(np.concatenate(([True], key[1:] != key[:-1])))
+    pair = start[np.diff(np.append(start, len(key))) == 2]
+    one, other = order[pair], order[pair + 1]
+    wound = tail[one] == head[other]
+    one, other = one[wound], other[wound]
+    return one // 3, other // 3, one % 3, other % 3
 
 
 def _orient(
@@ -288,6 +416,12 @@ def _orient(
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
+    seam = np.zeros(vertex_count, dtype=bool)
+    tail = triangles.ravel()
+    head = np.roll(triangles, -1, axis=1).ravel()
+    directed = np.sort(tail * vertex_count + head)
+    if not (directed[1:] == directed[:-1]).any():
+        return triangles, seam  # no edge is run through twice in the same direction
     count = len(triangles)
     tail = triangles.ravel()
     head = np.roll(triangles, -1, axis=1).ravel()
@@ -299,7 +433,6 @@ def _orient(
     start = np.flatnonzero(np.concatenate(([True], key[1:] != key[:-1])))
     pair = start[np.diff(np.append(start, len(key))) == 2]
     one, other, alike = face[pair], face[pair + 1], forward[pair] == forward[pair + 1]
-    seam = np.zeros(vertex_count, dtype=bool)
     if not alike.any():
         return triangles, seam
 
@@ -319,3 +452,24 @@ def _orient(
     torn = order[pair][alike ^ flip[one] ^ flip[other]]
     seam[tail[torn]] = seam[head[torn]] = True
     return np.where(flip[:, None], triangles[:, ::-1], triangles), seam
+
+
+def _canonical_faces(triangles: Indices, count: int) -> Indices:
+    """Start each face at its first vertex, winding kept, and sort the faces.
+
+    So the last digit of every sum over faces is the same whatever the order they came in.
+    """
+    a, b, c = triangles.T
+    second, third = (b < a) & (b < c), (c < a) & (c < b)
+    turned = np.stack(
+        (
+            np.where(second, b, np.where(third, c, a)),
+            np.where(second, c, np.where(third, a, b)),
+            np.where(second, a, np.where(third, b, c)),
+        )
+    )
+    if count < 2**21:
+        order = np.argsort((turned[0] * count + turned[1]) * count + turned[2])
+    else:
+        order = np.lexsort(turned[::-1])
+    return np.ascontiguousarray(turned[:, order].T)

@@ -19,6 +19,8 @@ ROUNDING = 1e-6
 # A face's centre is at least this far out; a box's corners lie on a sphere, its faces do not.
 INNERMOST = 0.9
 MOST_EXTENT = 1e15
+# Faces looked at before all of them are.
+SAMPLE = 2_000
 
 
 def sphere_curvature(mesh: TriMesh) -> CurvatureField | None:
@@ -26,6 +28,8 @@ def sphere_curvature(mesh: TriMesh) -> CurvatureField | None:
 
     Parts of a sphere count. The sphere is fitted by least squares to |v|^2 = 2 c.v + (r^2 - |c|^2).
     """
+    if len(mesh.triangles) > 2 * SAMPLE and not _may_be_sphere(mesh):
+        return None
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.triangles] = True
     points = mesh.vertices[used]
@@ -57,3 +61,20 @@ def sphere_curvature(mesh: TriMesh) -> CurvatureField | None:
     curvature = np.where(used, value, 0.0)
     nothing = np.zeros(len(mesh.vertices), dtype=bool)
     return CurvatureField(curvature, curvature.copy(), nothing, CleaningReport())
+
+
+def _may_be_sphere(mesh: TriMesh) -> bool:
+    """Tell from some faces whether it is worth looking at all: most meshes are no spheres."""
+    some = mesh.triangles[:: len(mesh.triangles) // SAMPLE]
+    points = mesh.vertices[some.ravel()]
+    if not (np.abs(points) < MOST_EXTENT).all():
+        return False
+    centred = points - points.mean(axis=0)
+    extent = max(float(np.ptp(centred, axis=0).max()), 1.0 / MOST_EXTENT)
+    scaled = centred / extent
+    system = np.column_stack((2.0 * scaled, np.ones(len(scaled))))
+    solution, *_ = np.linalg.lstsq(system, (scaled**2).sum(axis=1), rcond=None)
+    radius2 = max(solution[3] + solution[:3] @ solution[:3], 0.0)
+    off = np.abs(np.linalg.norm(scaled - solution[:3], axis=1) - np.sqrt(radius2))
+    # Looser than the test itself, as these faces may be larger than most.
+    return bool(off.max() <= 0.02 * np.sqrt(radius2))

@@ -30,6 +30,8 @@ class CurvatureSummary:
     median: float
     high: float
     """95th percentile of kappa; the maximum of a real mesh is a crease and says little."""
+    mean_high: float
+    """95th percentile of the absolute mean curvature."""
     mean_values: tuple[float, float, float, float]
     """Means of kappa, k1, k2 and signed mean curvature."""
 
@@ -54,4 +56,9 @@ def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
         spread = max(np.ptp(field.k1[used]), np.ptp(field.k2[used]))
         if spread <= 4.0 * CONSTANT_TOLERANCE * kappa.mean():
             kind = CONSTANT
-    return CurvatureSummary(kind, float(low), float(median), float(high), means)  # type: ignore[arg-type]
+    mean_high = float(np.percentile(np.abs(field.mean[used]), 95.0))
+    return CurvatureSummary(kind, float(low), float(median), float(high), mean_high, means)  # type: ignore[arg-type]
+
+
+FLAT_SUMMARY = CurvatureSummary(FLAT, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+"""Of a mesh that bends nowhere."""

@@ -92,7 +92,7 @@ def bench_curvature() -> tuple[str, list[str], Rows]:
             mesh = TriMesh.from_arrays(surface.vertices, surface.triangles)
             for radius in (2, 3):
                 start = time.process_time()
-                found = principal_curvatures(mesh, radius)
+                found = principal_curvatures(mesh, radius=radius)
                 spent = time.process_time() - start
                 scale = math.sqrt(float((surface.kappa**2).mean()))
                 inner = surface.inner

@@ -29,7 +29,7 @@ def traces() -> dict[str, Any]:
 @pytest.mark.smoke
 def test_enable_disable_enable(_enabled: None) -> None:
     with_it = traces()
-    assert with_it["operators"] == ["remove", "setup", "show_curvature", "update"]
+    assert with_it["operators"] == ["remove", "save_curvature", "setup", "show_curvature", "update"]
     assert with_it["material"] and with_it["mesh"] and len(with_it["handlers"]) == 4
     bpy.ops.preferences.addon_disable(module="cdrf_addon")
     gone = traces()

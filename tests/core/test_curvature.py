@@ -17,10 +17,15 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from cdrf_addon.core import curvature
-from cdrf_addon.core.curvature import CurvatureField, curvature_steps, principal_curvatures
+from cdrf_addon.core.curvature import (
+    CurvatureField,
+    curvature_steps,
+    principal_curvatures,
+)
 from cdrf_addon.core.errors import ParameterError
+from cdrf_addon.core.estimators import DEFAULT_METHOD, libigl, polynomial
 from cdrf_addon.core.mesh import TriMesh, edge_lengths
+from cdrf_addon.core.progress import run_steps
 from tests.core.test_mesh import grid_triangles, icosphere, moebius, plane, unweld
 
 Surface = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -97,10 +102,12 @@ def cone(segments: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
     return np.vstack(((0.0, 0.0, 1.0), body)), np.vstack((tip, faces))
 
 
-def estimate(vertices: ArrayLike, faces: ArrayLike, radius: int = 2) -> CurvatureField:
+def estimate(
+    vertices: ArrayLike, faces: ArrayLike, radius: int = 2, method: str = DEFAULT_METHOD
+) -> CurvatureField:
     """Estimate, and hold what holds for every mesh."""
     mesh = TriMesh.from_arrays(vertices, faces)
-    result = principal_curvatures(mesh, radius)
+    result = principal_curvatures(mesh, method, radius)
     for values in (result.k1, result.k2, result.kappa, result.mean):
         assert values.shape == (len(mesh.vertices),)
         assert values.dtype == np.float64
@@ -160,9 +167,9 @@ TOLERANCE = {
 }
 
 
-def errors(name: str, irregular: bool, level: int) -> tuple[float, ...]:
+def errors(name: str, irregular: bool, level: int, method: str) -> tuple[float, ...]:
     vertices, faces, k1, k2 = SURFACES[name](level, irregular=irregular)
-    result = estimate(vertices, faces)
+    result = estimate(vertices, faces, method=method)
     assert not result.filled.any()
     assert result.sentences() == []
     kappa = np.sqrt((k1**2 + k2**2) / 2.0)
@@ -178,13 +185,20 @@ def errors(name: str, irregular: bool, level: int) -> tuple[float, ...]:
     return rms[0], worst[0], rms[1], worst[1], max(rms[2:])
 
 
+# The cubic has the quadric's bias on regular meshes, or up to a quarter more (torus: its terms of
+# fourth order are larger), and none of the irregular term; so only its worst vertex may differ.
+CUBIC_FACTOR = 1.3
+
+
+@pytest.mark.parametrize("method", ["CUBIC", "QUADRIC", "LIBIGL"])
 @pytest.mark.parametrize("irregular", [False, True], ids=["regular", "irregular"])
 @pytest.mark.parametrize("name", list(SURFACES))
-def test_the_estimate_converges_to_the_surface(name: str, irregular: bool) -> None:
-    measured = {key: errors(*key) for key in ACCURACY if key[:2] == (name, irregular)}
+def test_the_estimate_converges_to_the_surface(name: str, irregular: bool, method: str) -> None:
+    measured = {key: errors(*key, method) for key in ACCURACY if key[:2] == (name, irregular)}
     assert len(measured) == 3
+    factor = CUBIC_FACTOR if method == "CUBIC" else 1.0
     for key, values in measured.items():
-        allowed = ACCURACY[key]
+        allowed = [factor * most for most in ACCURACY[key]]
         told = " ".join(f"{value:.2e}" for value in values)
         assert all(got <= most for got, most in zip(values, allowed, strict=True)), (key, told)
     # The edge halves from one resolution to the next.
@@ -197,7 +211,8 @@ def test_the_estimate_converges_to_the_surface(name: str, irregular: bool) -> No
 @pytest.mark.smoke
 @pytest.mark.parametrize("key", [key for key in ACCURACY if key[1] and key[2] in (4, 6)], ids=str)
 def test_the_middle_resolution(key: tuple[str, bool, int]) -> None:
-    assert all(got <= most for got, most in zip(errors(*key), ACCURACY[key], strict=True))
+    found = errors(*key, "CUBIC")
+    assert all(got <= CUBIC_FACTOR * most for got, most in zip(found, ACCURACY[key], strict=True))
 
 
 def quadric(a: float, b: float) -> tuple[np.ndarray, np.ndarray]:
@@ -341,15 +356,21 @@ def mixed_mesh() -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(pieces), np.concatenate([*wound, faces[:3], faces[:3, [0, 0, 1]]])
 
 
+def cut_into(monkeypatch, vertices: int) -> None:
+    """Let the estimators work on so many vertices at a time."""
+    monkeypatch.setattr(libigl, "CHUNK_VERTICES", vertices)
+    monkeypatch.setattr(polynomial, "BLOCK_PAIRS", 20 * vertices)
+
+
 @pytest.mark.smoke
 @pytest.mark.parametrize("size", [40, 301, 1000])
 def test_cutting_into_pieces_changes_nothing(monkeypatch, size: int) -> None:
     vertices, faces = mixed_mesh()
-    for radius in (2, 3):
-        monkeypatch.setattr(curvature, "CHUNK_VERTICES", 10**9)
-        whole = estimate(vertices, faces, radius)
-        monkeypatch.setattr(curvature, "CHUNK_VERTICES", size)
-        cut = estimate(vertices, faces, radius)
+    for radius, method in ((2, "CUBIC"), (3, "QUADRIC"), (2, "LIBIGL"), (3, "LIBIGL")):
+        cut_into(monkeypatch, 10**9)
+        whole = estimate(vertices, faces, radius, method)
+        cut_into(monkeypatch, size)
+        cut = estimate(vertices, faces, radius, method)
         assert np.array_equal(cut.k1, whole.k1)
         assert np.array_equal(cut.k2, whole.k2)
         assert np.array_equal(cut.filled, whole.filled)
@@ -360,7 +381,7 @@ def test_progress_runs_from_nothing_to_all(monkeypatch) -> None:
     vertices, faces = mixed_mesh()
     mesh = TriMesh.from_arrays(vertices, faces)
     for size, least in ((10**9, 5), (50, 20)):
-        monkeypatch.setattr(curvature, "CHUNK_VERTICES", size)
+        cut_into(monkeypatch, size)
         progress = list(curvature_steps(mesh))
         assert progress[0] == 0.0
         assert progress[-1] == 1.0
@@ -371,8 +392,8 @@ def test_progress_runs_from_nothing_to_all(monkeypatch) -> None:
 def test_stopping_half_way_leaves_nothing_behind(monkeypatch) -> None:
     vertices, faces = mixed_mesh()
     mesh = TriMesh.from_arrays(vertices, faces)
-    monkeypatch.setattr(curvature, "CHUNK_VERTICES", 100)
-    before = principal_curvatures(mesh)
+    cut_into(monkeypatch, 100)
+    before = run_steps(curvature_steps(mesh)).on_source()
     count = len(list(curvature_steps(mesh)))
     for stop in range(count + 1):
         steps = curvature_steps(mesh)
@@ -402,7 +423,7 @@ def test_more_rings_are_coarser_but_fine(radius: int) -> None:
 def test_other_radii_are_refused_in_a_sentence(radius: int) -> None:
     mesh = TriMesh.from_arrays(*plane(4))
     with pytest.raises(ParameterError, match=r"2 to 10 rings.*\.$"):
-        principal_curvatures(mesh, radius)
+        principal_curvatures(mesh, radius=radius)
 
 
 @pytest.mark.smoke

@@ -127,12 +127,13 @@ def cleaned(vertices: ArrayLike, faces: ArrayLike) -> CleanMesh:
 def test_a_good_mesh_is_only_moved_and_scaled() -> None:
     vertices, faces = icosphere(2)
     result = cleaned(3.0 * vertices + (5.0, -7.0, 11.0), faces)
-    assert np.array_equal(result.triangles, faces)
-    assert np.array_equal(result.source, np.arange(len(vertices)))
+    assert np.array_equal(windings(result.triangles), windings(result.source[faces]))
+    assert np.array_equal(np.sort(result.source), np.arange(len(vertices)))
     assert result.report.sentences() == []
     assert result.report.welded_vertices == 0
     assert result.edge == pytest.approx(3.0 * np.median(edge_lengths(vertices, faces)))
-    back = (result.vertices - result.vertices[0]) * result.edge
+    back = result.vertices[result.source]
+    back = (back - back[0]) * result.edge
     assert np.abs(back - 3.0 * (vertices - vertices[0])).max() <= TOLERANCE["coordinates"]
     assert np.median(edge_lengths(result.vertices, result.triangles)) == pytest.approx(1.0)
 
@@ -149,7 +150,7 @@ def test_scale_is_taken_out(exponent: int) -> None:
 
 def test_lengths_of_edges() -> None:
     lengths = edge_lengths(np.array([(0.0, 0, 0), (3, 0, 0), (3, 4, 0)]), np.array([(0, 1, 2)]))
-    assert lengths.tolist() == [[3.0, 4.0, 5.0]]
+    assert lengths.tolist() == [[3.0], [4.0], [5.0]]
 
 
 # --- welding ------------------------------------------------------------------------------------
@@ -201,8 +202,8 @@ def test_an_unwelded_copy_cleans_to_the_same_mesh() -> None:
     loose, corners, original = unweld(vertices, faces)
     one, other = cleaned(vertices, faces), cleaned(loose, corners)
     assert np.array_equal(other.vertices, one.vertices)
-    assert np.array_equal(other.triangles, one.triangles)
-    assert np.array_equal(other.source, original)
+    assert np.array_equal(windings(other.triangles), windings(one.triangles))
+    assert np.array_equal(other.source, one.source[original])
     assert other.report.welded_vertices == len(loose) - len(vertices)
     assert other.report.sentences() == []
 
@@ -214,7 +215,7 @@ def test_faces_twice_on_the_same_vertices_are_used_once() -> None:
     vertices, faces = icosphere(1)
     rolled, reversed_ = np.roll(faces[:7], 1, axis=1), faces[7:12, ::-1]
     result = cleaned(vertices, np.concatenate((faces, faces[:5], rolled, reversed_)))
-    assert np.array_equal(result.triangles, faces)
+    assert np.array_equal(windings(result.triangles), windings(result.source[faces]))
     assert result.report.duplicate_faces == 17
     assert result.report.sentences() == ["17 faces lie twice on the same vertices; used once."]
 
@@ -295,7 +296,7 @@ def test_faces_turned_round_are_turned_back(part: float) -> None:
     result = cleaned(vertices, np.where(turned[:, None], faces[:, ::-1], faces))
     assert result.report.flipped_faces == turned.sum()
     assert not result.report.non_orientable
-    assert np.array_equal(windings(result.triangles), windings(faces))
+    assert np.array_equal(windings(result.triangles), windings(result.source[faces]))
     assert volume(result.vertices, result.triangles) > 0.0
 
 
@@ -303,7 +304,7 @@ def test_half_of_the_faces_turned_round_still_give_one_side() -> None:
     vertices, faces = icosphere(3)
     half = np.arange(len(faces)) % 2 == 0
     result = cleaned(vertices, np.where(half[:, None], faces[:, ::-1], faces))
-    whole = abs(volume(result.vertices, faces))
+    whole = abs(volume(result.vertices, result.source[faces]))
     assert abs(volume(result.vertices, result.triangles)) == pytest.approx(whole)
     assert result.report.flipped_faces == len(faces) // 2
 
@@ -344,7 +345,7 @@ def test_edges_of_three_faces_say_nothing_about_winding() -> None:
     vertices = np.vstack(((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), fins))
     faces = np.array([(0, 1, 2), (0, 1, 3), (1, 0, 4)])
     result = cleaned(vertices, faces)
-    assert np.array_equal(result.triangles, faces)
+    assert np.array_equal(windings(result.triangles), windings(result.source[faces]))
     assert result.report.flipped_faces == 0
     assert not result.report.non_orientable
 

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes of flat faces only: planes, boxes, walls. Nothing of them bends, nothing scatters."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .mesh import TriMesh, shared_edges, weld
+from .topology import face_normals
+
+# Faces this close to one plane are one flat face; float32 positions of a plane lean less.
+FLAT_ANGLE = math.radians(1.0)
+# Faces that meet at this angle meet at a corner, not on a coarsely divided round surface.
+CORNER_ANGLE = math.radians(59.0)
+# Larger meshes are not boxes, and looking would take time.
+MOST_TRIANGLES = 200_000
+# Edges looked at before all of them are.
+SAMPLE = 999
+
+
+def is_faceted(mesh: TriMesh) -> bool:
+    """Tell whether every two neighbouring faces lie in one plane or meet at a sharp corner."""
+    triangles = mesh.triangles
+    if len(triangles) > MOST_TRIANGLES or not np.isfinite(mesh.vertices).all():
+        return False
+    welded, first = weld(mesh.vertices)
+    vertices, triangles = mesh.vertices[first], welded[triangles]
+    with np.errstate(over="ignore", invalid="ignore"):
+        normal, doubled_area = face_normals(vertices, triangles)
+        if not (doubled_area > 0.0).all() or not np.isfinite(doubled_area).all():
+            return False
+        unit = normal / doubled_area
+    face, other, _, _ = shared_edges(triangles, len(vertices))
+    for some in (slice(0, SAMPLE), slice(SAMPLE, None)):
+        cosine = (unit[:, face[some]] * unit[:, other[some]]).sum(axis=0)
+        round_ = (cosine < math.cos(FLAT_ANGLE)) & (cosine > math.cos(CORNER_ANGLE))
+        if round_.any():
+            return False
+    return True

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curvature at the length over which light diffuses, for every length at once.
+
+A bump much smaller than the distance that light travels under the surface does not bend the
+surface, as far as the light can tell: the curvature that counts is the curvature diffused over that
+distance (docs/decisions/006). It differs from channel to channel and moves with the slider, so each
+vertex keeps kappa at a geometric series of lengths, and the shader interpolates between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .diffusion import Diffusion
+
+if TYPE_CHECKING:
+    from .curvature import CleanCurvature
+    from .mesh import Points
+
+# Four fit into one colour attribute.
+LEVELS = 4
+# From each length to the next; docs/kappa_choice.md has the loss by interpolation.
+LEVEL_RATIO = 4.0
+# Diffusion length over sigma0, measured against path tracing (docs/kappa_choice.md).
+LENGTH_PER_SIGMA0 = 3.0
+
+
+@dataclass(frozen=True)
+class KappaLevels:
+    """Curvature at several diffusion lengths, in the source's vertices and unit."""
+
+    values: Points
+    """(N, LEVELS) kappa, 1/unit; column i at the length finest * LEVEL_RATIO^i."""
+    finest: float
+    """The shortest length."""
+
+    def at(self, length: float) -> Points:
+        """Kappa at a length, (N,), linear in its logarithm between the stored ones."""
+        place = np.log(max(length / self.finest, 1.0)) / np.log(LEVEL_RATIO)
+        weights = np.clip(1.0 - np.abs(np.arange(LEVELS) - min(place, LEVELS - 1.0)), 0.0, 1.0)
+        return np.asarray(self.values @ weights)
+
+
+def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels]:
+    """Diffuse the curvature of a mesh over lengths that follow its size, yielding the part done.
+
+    The lengths are parts of the square root of the area, not of the edges: the same shape has the
+    same levels however finely it is divided.
+    """
+    mesh = curvature.mesh
+    diffusion = Diffusion(mesh)
+    finest = np.sqrt(diffusion.area) / LEVEL_RATIO**LEVELS
+    kappa = np.sqrt((curvature.k1**2 + curvature.k2**2) / 2.0)
+    lengths = [float(finest * LEVEL_RATIO**level) for level in range(LEVELS)]
+    fields = yield from diffusion.steps(kappa[:, None], lengths)
+    columns = [mesh.to_source(values[:, 0]) / mesh.edge for values in fields]
+    return KappaLevels(np.stack(columns, axis=1), float(finest * mesh.edge))

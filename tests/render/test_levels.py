@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curvature at the channel's own diffusion length: the shader's interpolation in rendered pixels."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from rig import Rig, cdrf_node
+from tolerances import SHADER
+
+from cdrf_addon import ids
+from cdrf_addon.core.reflectance import reflectance
+from cdrf_addon.core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS, KappaLevels
+
+FROM_THE_SIDE = (math.radians(50.0), 0.0, math.radians(70.0))
+KAPPAS = (3.0, 1.5, 0.6, 0.2)
+
+
+def egg(rig: Rig) -> bpy.types.Object:
+    """Almost a sphere: its curvature varies, so it is stored at the vertices."""
+    item = rig.sphere()
+    item.scale = (1.0, 1.0, 1.1)
+    bpy.ops.object.transform_apply(scale=True)
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    cdrf_node(item).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
+    return item
+
+
+def store(mesh: bpy.types.Mesh, levels: KappaLevels) -> None:
+    attribute = mesh.attributes[ids.DIFFUSED_ATTRIBUTE]
+    attribute.data.foreach_set("color", np.tile(levels.values[0], len(mesh.vertices)))
+    mesh[ids.LENGTH_KEY] = levels.finest
+    mesh.update_tag()
+
+
+@pytest.mark.smoke
+def test_each_channel_takes_kappa_at_its_own_length(rig: Rig) -> None:
+    sun = rig.light("SUN", energy=math.pi, angle=0.0, rotation=FROM_THE_SIDE)
+    item = egg(rig)
+    levels = KappaLevels(np.array([KAPPAS]), finest=0.02)
+    store(item.data, levels)
+    material = item.data.materials[0]
+    ratio = (1.0, 0.3, 0.05)
+    material.cdrf.sigma0_ratio = ratio
+    normals, covered = rig.normals(item)
+    bpy.context.view_layer.update()
+    towards = np.array(sun.matrix_world)[:3, 2]
+    theta = np.arccos(np.clip(normals[covered] @ towards, -1.0, 1.0))
+    longest = 0.02 * LEVEL_RATIO ** (LEVELS - 1) / LENGTH_PER_SIGMA0
+    # Below the shortest length, between the lengths, and beyond the longest.
+    for sigma0 in (0.0, 0.01, 0.05, 0.17, 0.6, 2.0 * longest):
+        material.cdrf.sigma0 = sigma0
+        value, _ = rig.render_exact(item, "Shader", -0.01, 1.01)
+        for channel, factor in enumerate(ratio):
+            own = sigma0 * factor
+            kappa = float(levels.at(LENGTH_PER_SIGMA0 * own)[0])
+            error = np.abs(value[covered][:, channel] - reflectance(theta, own * kappa))
+            assert error.max() <= SHADER.worst, (sigma0, channel, error.max())
+
+
+def test_an_object_twice_as_large_scatters_like_the_measured_one_at_half_the_distance(
+    rig: Rig,
+) -> None:
+    sun = rig.light("SUN", energy=math.pi, angle=0.0, rotation=FROM_THE_SIDE)
+    item = egg(rig)
+    other = item.copy()
+    other.scale, other.location = (2.0, 2.0, 2.0), (50.0, 0.0, 0.0)
+    rig.scene.collection.objects.link(other)
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+    material = item.data.materials[0]
+    levels = KappaLevels(np.array([KAPPAS]), finest=0.02)
+    store(item.data, levels)
+    bpy.context.view_layer.update()
+    towards = np.array(sun.matrix_world)[:3, 2]
+    material.cdrf.sigma0 = 0.4
+    for shown, hidden, size, centre in ((item, other, 1.0, 0.0), (other, item, 2.0, 50.0)):
+        rig.camera.data.ortho_scale, rig.camera.location.x = 2.3 * size, centre
+        shown.hide_render, hidden.hide_render = False, True
+        normals, covered = rig.normals(shown)
+        theta = np.arccos(np.clip(normals[covered] @ towards, -1.0, 1.0))
+        kappa = float(levels.at(LENGTH_PER_SIGMA0 * 0.4 / size)[0]) / size
+        value, _ = rig.render_exact(shown, "Shader", -0.01, 1.01)
+        error = np.abs(value[covered][:, 0] - reflectance(theta, 0.4 * kappa))
+        assert error.max() <= SHADER.worst, (size, error.max())
