@@ -37,8 +37,11 @@ from cdrf_addon.blender.materials import cdrf_node
 from cdrf_addon.core.curvature import Options
 from cdrf_addon.core.errors import CdrfError, ParameterError, SceneError
 from cdrf_addon.core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
+from cdrf_addon.core.progress import in_words
 
 VERSION = 1
+# Longer work than this says how far it is.
+PROGRESS_SECONDS = 0.5
 JOURNAL = "pictures.tsv"
 DEMO_MESH = Path(__file__).resolve().parents[1] / "tests" / "data" / "human_head.obj"
 # The head's unit is the decimetre; skin's colours and the reach of its red, green and blue.
@@ -288,11 +291,12 @@ def _make_translucent(record: SceneRecord, mesh_file: bool, options: argparse.Na
             record.warnings.append("Nothing was translucent yet: every mesh was set up.")
     if objects or not linked:
         job = setup.Setup(bpy.context, objects, options=_measurement(options))
-        shown = -1
+        start = told = time.perf_counter()
         for part, what in job.steps():
-            if int(part * 4) > shown:
-                shown = int(part * 4)
-                say(f"  {what}: {part:.0%}")
+            now = time.perf_counter()
+            if now - told >= PROGRESS_SECONDS:
+                told = now
+                say(f"  {what}: {in_words(part, now - start)}")
         report = job.commit()
         record.vertices = report.vertices
         record.warnings += report.warnings

@@ -26,6 +26,7 @@ from .core.curvature import Options
 from .core.errors import CdrfError
 from .core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
 from .core.mesh import NO_CREASE
+from .core.progress import in_words
 
 # Meshes up to this size are done in under half a second; above it a progress bar comes up.
 MODAL_FROM_VERTICES = 15_000
@@ -95,10 +96,9 @@ class _Job(bpy.types.Operator):
             self._leave_modal(context)
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        elapsed = time.monotonic() - self._start
-        left = f", {elapsed * (1.0 - part) / part:.0f} s left" if part > 0.1 else ""
         context.window_manager.progress_update(part)
-        context.workspace.status_text_set(f"CDRF: {what}, {part:.0%}{left}   (Esc stops)")
+        far = in_words(part, time.monotonic() - self._start)
+        context.workspace.status_text_set(f"CDRF: {what}, {far}   (Esc stops)")
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:

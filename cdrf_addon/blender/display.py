@@ -94,9 +94,7 @@ def hide(scene: bpy.types.Scene, skins: Iterable[bpy.types.Material]) -> None:
         del scene[ids.DISPLAY_KEY]
 
 
-def refresh(
-    scene: bpy.types.Scene, skins: dict[bpy.types.Material, list[bpy.types.Mesh]]
-) -> None:
+def refresh(scene: bpy.types.Scene, skins: dict[bpy.types.Material, list[bpy.types.Mesh]]) -> None:
     """Bring the materials that show curvature up to date with new curvature and node groups."""
     kept = scene.get(ids.DISPLAY_KEY)
     shown = {skin: meshes for skin, meshes in skins.items() if shows_curvature(skin)}

@@ -25,6 +25,9 @@ def is_faceted(mesh: TriMesh) -> bool:
     triangles = mesh.triangles
     if len(triangles) > MOST_TRIANGLES or not np.isfinite(mesh.vertices).all():
         return False
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     welded, first = weld(mesh.vertices)
     vertices, triangles = mesh.vertices[first], welded[triangles]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -38,4 +41,15 @@ def is_faceted(mesh: TriMesh) -> bool:
         round_ = (cosine < math.cos(FLAT_ANGLE)) & (cosine > math.cos(CORNER_ANGLE))
         if round_.any():
             return False
-    return True
+    # A finely divided ball passes so far: no two neighbours differ by much. Its faces do not all
+    # lie in the planes of the sides.
+    smooth = (unit[:, face] * unit[:, other]).sum(axis=0) > math.cos(CORNER_ANGLE)
+    joined = np.ones(int(smooth.sum()), dtype=np.int8), (face[smooth], other[smooth])
+    count = len(triangles)
+    _, side = connected_components(coo_array(joined, (count, count)), directed=False)
+    total = np.stack([np.bincount(side, part) for part in normal])
+    length = np.sqrt((total**2).sum(axis=0))
+    if not (length > 0.0).all():
+        return False
+    mean = total / length
+    return bool(((unit * mean[:, side]).sum(axis=0) >= math.cos(FLAT_ANGLE)).all())

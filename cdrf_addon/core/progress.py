@@ -32,6 +32,12 @@ def portion(
         yield start + (end - start) * done
 
 
+def in_words(part: float, elapsed: float) -> str:
+    """Say how far long work is and how long it will take: "40%, 3 s left"."""
+    left = f", {elapsed * (1.0 - part) / part:.0f} s left" if part > 0.1 else ""
+    return f"{part:.0%}{left}"
+
+
 def counted(steps: Generator[None, None, Result], expected: int) -> Generator[float, None, Result]:
     """Turn pauses into progress."""
     done = 0

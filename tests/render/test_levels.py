@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curvature at the channel's own diffusion length: the shader's interpolation in rendered pixels."""
+"""Curvature at each channel's own diffusion length: the shader's interpolation in pixels."""
 
 from __future__ import annotations
 
