@@ -29,11 +29,11 @@ WEIGHT_LIMIT = 100.0
 # Up to this many vertices no step is long enough to be worth a coarser mesh.
 COARSE_ABOVE = 20_000
 # Cells of the coarse mesh per length l.
-CELLS_PER_LENGTH = 8.0
+CELLS_PER_LENGTH = 6.0
 # A coarse mesh is worth its making from this cell size on, in median edges.
 COARSE_FROM = 1.6
 # Residual of the conjugate gradients, as a part of the right-hand side.
-RESIDUAL = 3e-4
+RESIDUAL = 1e-3
 MAX_ITERATIONS = 1000
 
 
@@ -69,45 +69,54 @@ class _Level:
         return np.asarray(self.weights.sum(axis=1)).ravel()
 
     def solve(self, right: Points, length: float) -> Points:
-        """Take one step; `right` is M b, (n, k)."""
+        """Take one step; `right` is M b, (n,)."""
         time = length**2 / 2.0
         diagonal = self.areas + time * self.valences
         return conjugate_gradients(diagonal, self.weights * time, right)
 
 
 def conjugate_gradients(diagonal: Points, coupling: Any, right: Points) -> Points:
-    """Solve (diag - coupling) x = right for several right-hand sides, preconditioned by diag.
+    """Solve (diag - coupling) x = right, preconditioned by diag.
 
-    scipy's own solver takes one right-hand side, and its dot products wake as many threads as there
-    are cores for a microsecond of work each, fifteen times slower on a busy machine.
+    scipy's own solver takes dot products by BLAS, which wakes as many threads as there are cores
+    for a microsecond of work each: fifteen times slower on a busy machine.
 
     Args:
         diagonal: (n,) positive.
         coupling: (n, n) sparse, symmetric, >= 0, row sums below the diagonal.
-        right: (n, k).
+        right: (n,).
 
     Returns:
-        (n, k), with a residual of at most RESIDUAL.
+        (n,), with a residual of at most RESIDUAL.
     """
-    inverse = 1.0 / diagonal[:, None]
+    inverse = 1.0 / diagonal
     found = right * inverse
     residual = coupling @ found  # right - A found, as diag found is right
-    enough = RESIDUAL**2 * (right * right * inverse).sum(axis=0)
+    enough = RESIDUAL**2 * _dot(right * inverse, right)
     step = residual * inverse
-    size = (residual * step).sum(axis=0)
+    size = _dot(residual, step)
+    image = np.empty_like(step)
     for _ in range(MAX_ITERATIONS):
-        if (size <= enough).all():
+        if size <= enough:
             break
-        image = diagonal[:, None] * step - coupling @ step
-        steepness = (step * image).sum(axis=0)
-        along = size / np.where(steepness > 0.0, steepness, 1.0)
+        np.multiply(diagonal, step, out=image)
+        image -= coupling @ step
+        steepness = _dot(step, image)
+        if not steepness > 0.0:
+            break  # only rounding is left
+        along = size / steepness
         found += along * step
-        residual -= along * image
-        scaled = residual * inverse
-        previous, size = size, (residual * scaled).sum(axis=0)
-        step *= size / np.where(previous > 0.0, previous, 1.0)
-        step += scaled
+        image *= along
+        residual -= image
+        np.multiply(residual, inverse, out=image)
+        previous, size = size, _dot(residual, image)
+        step *= size / previous
+        step += image
     return found
+
+
+def _dot(one: Points, other: Points) -> float:
+    return float(np.einsum("i,i->", one, other))
 
 
 @dataclass(frozen=True)
@@ -121,41 +130,41 @@ class _Coarse:
     """(n, 3) from the patch's centre to the vertex."""
 
     def restrict(self, right: Points) -> Points:
-        """Sum a right-hand side, (n, k), over the patches."""
-        count = len(self.level.areas)
-        return np.stack([np.bincount(self.patch, part, minlength=count) for part in right.T], 1)
+        """Sum a right-hand side, (n,), over the patches."""
+        return np.bincount(self.patch, right, minlength=len(self.level.areas))
 
     def prolong(self, values: Points) -> Points:
-        """Continue values of the patches, (p, k), linearly to the fine mesh's vertices."""
-        fine = values[self.patch]
+        """Continue values of the patches, (p,), linearly to the fine mesh's vertices."""
         gradient = self._gradients(values)
+        fine = values[self.patch]
         for axis in range(3):
-            fine += self.offset[:, axis, None] * gradient[axis][self.patch]
+            fine += self.offset[:, axis] * gradient[:, axis][self.patch]
         return fine
 
     def _gradients(self, values: Points) -> Points:
-        """Least-squares gradients over the neighbouring patches, (3, p, k)."""
+        """Least-squares gradients over the neighbouring patches, (p, 3)."""
+        here, there, weight, inverse = self._neighbours
+        rise = values[there] - values[here]
+        slopes = [np.bincount(here, part * rise, minlength=len(values)) for part in weight.T]
+        return np.asarray((inverse @ np.stack(slopes, axis=1)[:, :, None])[:, :, 0])
+
+    @cached_property
+    def _neighbours(self) -> tuple[Indices, Indices, Points, Points]:
+        """Pairs of neighbouring patches, their weights, (e, 3), and inverse moments, (p, 3, 3)."""
         graph = self.level.weights.tocoo()
         here, there = graph.row, graph.col
         centres = self.level.vertices
-        count, columns = values.shape
         apart = centres[there] - centres[here]
         weight = apart / (apart**2).sum(axis=1)[:, None]
-        moment = np.empty((count, 3, 3))
+        moment = np.empty((len(centres), 3, 3))
         for i in range(3):
-            for j in range(3):
-                moment[:, i, j] = np.bincount(here, weight[:, i] * apart[:, j], minlength=count)
+            for j in range(i, 3):
+                entry = np.bincount(here, weight[:, i] * apart[:, j], minlength=len(centres))
+                moment[:, i, j] = moment[:, j, i] = entry
         # A patch and its neighbours lie in a plane, nearly: nothing is known across it.
         loose = 1e-2 * np.trace(moment, axis1=1, axis2=2) + np.finfo(np.float64).tiny
         moment += loose[:, None, None] * np.eye(3)
-        rise = values[there] - values[here]
-        slopes = np.empty((count, 3, columns))
-        for axis in range(3):
-            for column in range(columns):
-                slopes[:, axis, column] = np.bincount(
-                    here, weight[:, axis] * rise[:, column], minlength=count
-                )
-        return np.moveaxis(np.linalg.solve(moment, slopes), 1, 0)
+        return here, there, weight, np.linalg.inv(moment)
 
 
 def _cells(places: Points) -> Indices:
@@ -226,14 +235,14 @@ class Diffusion:
         """Diffuse a field over each of some lengths, yielding the part done.
 
         Args:
-            values: (n, k) at the vertices.
+            values: (n,) at the vertices.
             lengths: Standard deviations of the blur, ascending.
 
         Returns:
-            An array (n, k) for each length, within the range of the values.
+            An array (n,) for each length, within the range of the values.
         """
-        low, high = values.min(axis=0), values.max(axis=0)
-        level, right = self._fine, self._fine.areas[:, None] * values
+        low, high = values.min(), values.max()
+        level, right = self._fine, self._fine.areas * values
         coarser: list[_Coarse] = []
         found = []
         for done, length in enumerate(lengths):

@@ -56,6 +56,6 @@ def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels
     finest = np.sqrt(diffusion.area) / LEVEL_RATIO**LEVELS
     kappa = np.sqrt((curvature.k1**2 + curvature.k2**2) / 2.0)
     lengths = [float(finest * LEVEL_RATIO**level) for level in range(LEVELS)]
-    fields = yield from diffusion.steps(kappa[:, None], lengths)
-    columns = [mesh.to_source(values[:, 0]) / mesh.edge for values in fields]
+    fields = yield from diffusion.steps(kappa, lengths)
+    columns = [mesh.to_source(values) / mesh.edge for values in fields]
     return KappaLevels(np.stack(columns, axis=1), float(finest * mesh.edge))

@@ -44,8 +44,7 @@ def ball(level: int, stretch: float = 1.0) -> tuple[CleanMesh, np.ndarray]:
 
 def step(mesh: CleanMesh, values: np.ndarray, *lengths: float) -> list[np.ndarray]:
     inside = [length / mesh.edge for length in lengths]
-    fields = run_steps(Diffusion(mesh).steps(values[:, None], inside))
-    return [field[:, 0] for field in fields]
+    return run_steps(Diffusion(mesh).steps(values, inside))
 
 
 @pytest.mark.smoke

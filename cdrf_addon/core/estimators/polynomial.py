@@ -41,6 +41,7 @@ GOLDFEATHER: tuple[Exponents, ...] = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1
 
 # Pairs of a vertex and a neighbour in a block: their arrays just fit into a core's cache.
 BLOCK_PAIRS = 60_000
+BLOCKS_AT_ONCE = 16
 # Part of a diagonal entry that elimination must leave for the points to determine the fit. A cubic
 # that is hardly determined swings wildly; there the quadric takes over.
 PIVOT_LIMIT, CUBIC_PIVOT_LIMIT = 1e-8, 1e-3
@@ -77,25 +78,42 @@ def polynomial_steps(
     yield 0.03
     near = adjacency(triangles, count)
     yield 0.06
-    fit = _Fit(mesh.vertices, normals, used & sound, near, radius, tuple(terms), use_normals)
+    fit = _Fit(mesh.vertices, normals, used & sound, tuple(terms), use_normals)
     result = Estimate.empty(count)
     workers = max(1, os.cpu_count() or 1)
-    size = max(64, BLOCK_PAIRS // _pairs_per_vertex(near, radius))
-    blocks = deque((start, min(start + size, count)) for start in range(0, count, size))
     running: deque[Future[tuple[int, int, Estimate]]] = deque()
     with ThreadPoolExecutor(workers) as pool:
-        while blocks or running:
-            while blocks and len(running) < 2 * workers:
-                running.append(pool.submit(fit.block, *blocks.popleft()))
-            start, end, part = running.popleft().result()
-            result.put(slice(start, end), part)
-            yield 0.06 + 0.94 * end / count
+        for start, rings in _ring_blocks(near, radius):
+            running.append(pool.submit(fit.block, start, rings))
+            while len(running) > 2 * workers:
+                yield 0.06 + 0.94 * _store(result, running.popleft()) / count
+        while running:
+            yield 0.06 + 0.94 * _store(result, running.popleft()) / count
     return result
 
 
-def _pairs_per_vertex(near: Any, radius: int) -> int:
+def _store(result: Estimate, done: Future[tuple[int, int, Estimate]]) -> int:
+    start, end, part = done.result()
+    result.put(slice(start, end), part)
+    return end
+
+
+def _ring_blocks(near: Any, radius: int) -> Generator[tuple[int, Any], None, None]:
+    """Cut the mesh into blocks: the first vertex of each, and a row of neighbours for each vertex.
+
+    Rings are made for many blocks at once, as every product of sparse matrices costs a pass over
+    all columns.
+    """
+    count = near.shape[0]
     # Rings grow with the square of the radius: 7, 19, 37, 61 points on a regular mesh.
-    return max(1, round(near.nnz / near.shape[0] * (1 + radius) * radius / 2))
+    per_vertex = max(1, round(near.nnz / count * (1 + radius) * radius / 2))
+    size = max(64, BLOCK_PAIRS // per_vertex)
+    for first in range(0, count, BLOCKS_AT_ONCE * size):
+        rings = near[first : first + BLOCKS_AT_ONCE * size]
+        for _ in range(radius - 1):
+            rings = rings @ near
+        for start in range(0, rings.shape[0], size):
+            yield first + start, rings[start : start + size]
 
 
 class _Fit:
@@ -104,21 +122,16 @@ class _Fit:
         vertices: Points,
         normals: Points,
         sound: NDArray[np.bool_],
-        near: Any,
-        radius: int,
         terms: tuple[Exponents, ...],
         use_normals: bool,
     ) -> None:
         self.vertices, self.normals, self.sound = vertices, normals, sound
-        self.near, self.radius = near, radius
         self.terms, self.use_normals = terms, use_normals
         self.columns = [np.ascontiguousarray(part) for part in (*vertices.T, *normals.T)]
 
-    def block(self, start: int, end: int) -> tuple[int, int, Estimate]:
-        """Fit around the vertices start to end."""
-        rings = self.near[start:end]
-        for _ in range(self.radius - 1):
-            rings = rings @ self.near
+    def block(self, start: int, rings: Any) -> tuple[int, int, Estimate]:
+        """Fit around the vertices from start on, a row of neighbours each; (start, end, result)."""
+        end = start + rings.shape[0]
         pairs = _Pairs(rings, self.vertices, self.normals, self.columns, start)
         k1, k2, solved = self._curvatures(pairs, self.terms)
         if len(self.terms) > len(QUADRIC) and not solved.all():
