@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .progress import with_progress
 from .topology import face_normals, scatter
 
 if TYPE_CHECKING:
@@ -35,6 +36,8 @@ COARSE_FROM = 1.6
 # Residual of the conjugate gradients, as a part of the right-hand side.
 RESIDUAL = 1e-3
 MAX_ITERATIONS = 1000
+# A dozen iterations on a million vertices take about half a second.
+ITERATIONS_PER_PAUSE = 12
 
 
 @dataclass(frozen=True)
@@ -68,15 +71,19 @@ class _Level:
         """Diagonal of L: the sum of the weights at each vertex."""
         return np.asarray(self.weights.sum(axis=1)).ravel()
 
-    def solve(self, right: Points, length: float) -> Points:
-        """Take one step; `right` is M b, (n,)."""
+    def solve_steps(self, right: Points, length: float) -> Generator[None, None, Points]:
+        """Take one heat step, pausing now and then; `right` is M b, (n,)."""
         time = length**2 / 2.0
         diagonal = self.areas + time * self.valences
-        return conjugate_gradients(diagonal, self.weights * time, right)
+        yield
+        found = yield from conjugate_gradients(diagonal, self.weights * time, right)
+        return found
 
 
-def conjugate_gradients(diagonal: Points, coupling: Any, right: Points) -> Points:
-    """Solve (diag - coupling) x = right, preconditioned by diag.
+def conjugate_gradients(
+    diagonal: Points, coupling: Any, right: Points
+) -> Generator[None, None, Points]:
+    """Solve (diag - coupling) x = right, preconditioned by diag, pausing now and then.
 
     scipy's own solver takes dot products by BLAS, which wakes as many threads as there are cores
     for a microsecond of work each: fifteen times slower on a busy machine.
@@ -96,9 +103,11 @@ def conjugate_gradients(diagonal: Points, coupling: Any, right: Points) -> Point
     step = residual * inverse
     size = _dot(residual, step)
     image = np.empty_like(step)
-    for _ in range(MAX_ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         if size <= enough:
             break
+        if iteration % ITERATIONS_PER_PAUSE == 0:
+            yield
         np.multiply(diagonal, step, out=image)
         image -= coupling @ step
         steepness = _dot(step, image)
@@ -246,13 +255,15 @@ class Diffusion:
         coarser: list[_Coarse] = []
         found = []
         for done, length in enumerate(lengths):
-            yield done / len(lengths)
+            part = done / len(lengths)
+            yield part
             cell = length / CELLS_PER_LENGTH
             if cell >= COARSE_FROM and len(values) > COARSE_ABOVE:
                 coarser.append(_coarsen(level, cell))
                 level, right = coarser[-1].level, coarser[-1].restrict(right)
-                yield (done + 0.5) / len(lengths)
-            result = level.solve(right, length)
+                yield part
+            solving = level.solve_steps(right, length)
+            result = yield from with_progress(solving, (done + 0.9) / len(lengths))
             for coarse in reversed(coarser):
                 result = coarse.prolong(result)
             found.append(np.clip(result, low, high))

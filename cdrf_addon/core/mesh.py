@@ -321,10 +321,11 @@ def _drop_unusable(
     longest = lengths.max(axis=0)
     stray = longest > EDGE_LIMIT
     report.stray_faces = int(stray.sum())
+    if stray.any():  # first, as their areas may be more than numbers can hold
+        triangles, longest = triangles[~stray], longest[~stray]
     _, doubled_area = face_normals(vertices, triangles)
     good = doubled_area > FLATNESS_LIMIT * longest**2
-    report.degenerate_faces = int((~good & ~stray).sum())
-    good &= ~stray
+    report.degenerate_faces = int((~good).sum())
     return triangles if good.all() else triangles[good]
 
 

@@ -49,3 +49,16 @@ def counted(steps: Generator[None, None, Result], expected: int) -> Generator[fl
             return result
         done += 1
         yield min(done / expected, 1.0)
+
+
+def with_progress(
+    steps: Generator[None, None, Result], part: float
+) -> Generator[float, None, Result]:
+    """Turn pauses of unknown number into progress that stands still at `part`."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            result: Result = stop.value
+            return result
+        yield part

@@ -8,6 +8,7 @@ Run as a script with seed and count, this file is the process that may crash.
 """
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -17,9 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cdrf_addon.core.curvature import principal_curvatures
+from cdrf_addon.core.curvature import CleanCurvature, Options, curvature_steps
 from cdrf_addon.core.errors import CdrfError
-from cdrf_addon.core.mesh import TriMesh
+from cdrf_addon.core.estimators import METHODS
+from cdrf_addon.core.mesh import NO_CREASE, CleanMesh, TriMesh, shared_edges
+from cdrf_addon.core.progress import run_steps
+from cdrf_addon.core.scale_space import LEVELS, level_steps
 from cdrf_addon.core.summary import summarise
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -101,13 +105,23 @@ def draw(seed: int, number: int) -> tuple[str, np.ndarray, np.ndarray]:
     return kind, positions(rng, kind, count), faces(rng, count)
 
 
+def options_of(number: int) -> Options:
+    """Vary how a mesh is measured, so that every kind of mesh meets every method."""
+    turn = number // len(KINDS)
+    method = list(METHODS)[turn % len(METHODS)]
+    crease = NO_CREASE if turn % 3 else math.radians(1.0 + turn % 170)
+    return Options(method, 2 + turn % 4, crease)
+
+
 def judge(seed: int, number: int) -> str:
     """Compute the curvature of a mesh; say "fine", "refused" or what went wrong."""
     _, vertices, triangles = draw(seed, number)
     start = time.perf_counter()
     try:
         mesh = TriMesh.from_arrays(vertices, triangles)
-        field = principal_curvatures(mesh)
+        cleaned = run_steps(curvature_steps(mesh, options_of(number)))
+        levels = run_steps(level_steps(cleaned))
+        field = cleaned.on_source()
         summary = summarise(mesh, field)
     except CdrfError as refusal:
         text = str(refusal)
@@ -122,7 +136,29 @@ def judge(seed: int, number: int) -> str:
         return "the summary is not finite"
     if not (values[0] >= values[1]).all():
         return "k1 is not the larger"
+    if levels.values.shape != (len(vertices), LEVELS) or not np.isfinite(levels.values).all():
+        return "a level is not finite"
+    if not 0.0 <= levels.values.min(initial=0.0) <= levels.values.max(initial=0.0) <= top(cleaned):
+        return "a level lies outside the curvature it comes from"
+    if not field.kappa.any() and not field.sentences() and bends(cleaned.mesh):
+        return "a silent zero"
     return "fine" if seconds < SECONDS_EACH else f"{seconds:.1f} s"
+
+
+def top(cleaned: CleanCurvature) -> float:
+    """Largest kappa of any part of the mesh, with room for rounding."""
+    kappa = np.hypot(cleaned.k1, cleaned.k2).max() / math.sqrt(2.0)
+    return float(kappa) / cleaned.mesh.edge * (1.0 + 1e-9)
+
+
+def bends(mesh: CleanMesh) -> bool:
+    """Tell whether two neighbouring faces, wound alike, meet at more than 5 degrees."""
+    normal, doubled_area = mesh.face_normals
+    unit = normal / doubled_area
+    face, other, _, _ = shared_edges(mesh.triangles, len(mesh.vertices))
+    cosine = (unit[:, face] * unit[:, other]).sum(axis=0)
+    # Folded flat on itself, a surface has no curvature to speak of either.
+    return bool(((cosine < math.cos(math.radians(5.0))) & (cosine > -0.9)).any())
 
 
 def work(seed: int, count: int) -> None:

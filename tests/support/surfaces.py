@@ -318,13 +318,6 @@ def sine_field(count: int, jitter: float = 0.0) -> Surface:
     return _height_field(count, _waves, jitter)
 
 
-SURFACES: dict[str, Callable[[int], Surface]] = {
-    "irregular sphere": sphere,
-    "irregular ellipsoid": ellipsoid,
-    "torus": torus,
-    "jittered torus": jittered_torus,
-}
-
 ALL_SURFACES: dict[str, Callable[[int], Surface]] = {
     "ico-sphere": ico_sphere,
     "irregular sphere": sphere,

@@ -129,6 +129,8 @@ class _Fit:
         self.terms, self.use_normals = terms, use_normals
         self.columns = [np.ascontiguousarray(part) for part in (*vertices.T, *normals.T)]
 
+    # Rings too small for their powers to be held come out as NaN, which `solve` takes for unsolved.
+    @np.errstate(divide="ignore", invalid="ignore", over="ignore", under="ignore")
     def block(self, start: int, rings: Any) -> tuple[int, int, Estimate]:
         """Fit around the vertices from start on, a row of neighbours each; (start, end, result)."""
         end = start + rings.shape[0]

@@ -46,16 +46,34 @@ def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
     weights = _voronoi_corners(edges, doubled_area)
     total = np.zeros((7, count))
     for corner in range(3):
-        towards = at_corner[corner]
-        u, v = (_turned(axis, unit, towards) for axis in (along, across))
+        turned = [_turned(axis, unit, at_corner[corner]) for axis in (along, across)]
         one_corner = np.zeros((len(triangles), 3))
-        for row, (i, j) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
-            entry = e * u[i] * u[j] + f * (u[i] * v[j] + v[i] * u[j]) + g * v[i] * v[j]
+        for row, entry in enumerate((*_tensor((e, f, g), *turned), np.ones(len(triangles)))):
             one_corner[:, corner] = weights[corner] * entry
             total[row] += scatter(triangles, one_corner, count)
-        one_corner[:, corner] = weights[corner]
-        total[6] += scatter(triangles, one_corner, count)
         yield 0.6 + 0.13 * corner
+    k1, k2 = _principal(total, normals)
+    yield 1.0
+    return Estimate(k1, k2, sound & ~mesh.seam)
+
+
+# What overflows on needles is infinite or NaN, and as useless as anything above the limit.
+_unheld = np.errstate(over="ignore", invalid="ignore", divide="ignore")
+
+
+@_unheld
+def _tensor(form: tuple[Points, Points, Points], u: Points, v: Points) -> list[Points]:
+    """The six entries of a face's second form in space, its axes turned into u and v."""
+    e, f, g = form
+    return [
+        e * u[i] * u[j] + f * (u[i] * v[j] + v[i] * u[j]) + g * v[i] * v[j]
+        for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+    ]
+
+
+@_unheld
+def _principal(total: Points, normals: Points) -> tuple[Points, Points]:
+    """Principal curvatures of the mean tensor at each vertex."""
     xx, xy, xz, yy, yz, zz = total[:6] / np.maximum(total[6], np.finfo(np.float64).tiny)
     # The tensor has no part along the normal: k1 and k2 are half its trace, more or less the size
     # of what is left in the tangent plane without that half.
@@ -68,10 +86,10 @@ def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
     xy, xz, yz = xy + half * x * y, xz + half * x * z, yz + half * y * z
     left = xx**2 + yy**2 + zz**2 + 2.0 * (xy**2 + xz**2 + yz**2)
     split = np.sqrt(left / 2.0)
-    yield 1.0
-    return Estimate(half + split, half - split, sound & ~mesh.seam)
+    return half + split, half - split
 
 
+@_unheld
 def _max_normals(mesh: CleanMesh, normal: Points, edges: list[Points]) -> tuple[Points, np.ndarray]:
     """Vertex normals weighted as by Max 1999, exact where the vertices lie on a sphere."""
     square = [(edge**2).sum(axis=0) for edge in edges]
@@ -91,6 +109,7 @@ def _max_normals(mesh: CleanMesh, normal: Points, edges: list[Points]) -> tuple[
     return (total / np.where(sound, length, 1.0)).T, sound
 
 
+@_unheld
 def _second_form(
     edges: list[Points], normals: list[Points], along: Points, across: Points
 ) -> tuple[Points, Points, Points]:
@@ -113,6 +132,7 @@ def _second_form(
     return e, f, g
 
 
+@_unheld
 def _turned(axis: Points, from_normal: Points, to_normal: Points) -> Points:
     """Turn a vector in the plane of one normal into that of another, by the shortest way."""
     lean = (axis * to_normal).sum(axis=0)
