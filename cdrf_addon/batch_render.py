@@ -15,6 +15,7 @@ import atexit
 import hashlib
 import json
 import math
+import os
 import subprocess
 import sys
 import tempfile
@@ -654,5 +655,14 @@ def _run(options: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
+def _leave(code: int) -> None:
+    """End the process; Blender 4.5 as a module now and then hangs in its libraries' destructors."""
+    if bpy.app.binary_path:
+        sys.exit(code)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    _leave(main())

@@ -33,8 +33,9 @@ COARSE_ABOVE = 20_000
 CELLS_PER_LENGTH = 6.0
 # A coarse mesh is worth its making from this cell size on, in median edges.
 COARSE_FROM = 1.6
-# Residual of the conjugate gradients, as a part of the right-hand side.
-RESIDUAL = 1e-3
+# Residual of the conjugate gradients, as a part of the right-hand side. Gaussian curvature spans
+# six decades on a head; at 1e-3, kappa in its flat parts was 33 % off at the worst vertex, now 0.4.
+RESIDUAL = 1e-5
 MAX_ITERATIONS = 1000
 # A dozen iterations on a million vertices take about half a second.
 ITERATIONS_PER_PAUSE = 12

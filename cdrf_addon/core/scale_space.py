@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .diffusion import Diffusion
+from .progress import portion
 
 if TYPE_CHECKING:
     from .curvature import CleanCurvature
@@ -26,7 +27,7 @@ LEVELS = 4
 # From each length to the next; docs/kappa_choice.md has the loss by interpolation.
 LEVEL_RATIO = 4.0
 # Diffusion length over sigma0, measured against path tracing (docs/kappa_choice.md).
-LENGTH_PER_SIGMA0 = 3.0
+LENGTH_PER_SIGMA0 = 2.0
 
 
 @dataclass(frozen=True)
@@ -48,14 +49,22 @@ class KappaLevels:
 def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels]:
     """Diffuse the curvature of a mesh over lengths that follow its size, yielding the part done.
 
+    First the mean and the Gaussian curvature over the shortest length: both are signed, so that the
+    noise of a scan averages out of them, which it does not of kappa = sqrt(2 mean^2 - Gaussian).
+    Then that kappa over the longer ones.
+
     The lengths are parts of the square root of the area, not of the edges: the same shape has the
     same levels however finely it is divided.
     """
     mesh = curvature.mesh
     diffusion = Diffusion(mesh)
-    finest = np.sqrt(diffusion.area) / LEVEL_RATIO**LEVELS
-    kappa = np.sqrt((curvature.k1**2 + curvature.k2**2) / 2.0)
-    lengths = [float(finest * LEVEL_RATIO**level) for level in range(LEVELS)]
-    fields = yield from diffusion.steps(kappa, lengths)
-    columns = [mesh.to_source(values) / mesh.edge for values in fields]
-    return KappaLevels(np.stack(columns, axis=1), float(finest * mesh.edge))
+    finest = float(np.sqrt(diffusion.area)) / LEVEL_RATIO**LEVELS
+    k1, k2 = curvature.k1, curvature.k2
+    (mean,) = yield from portion(diffusion.steps((k1 + k2) / 2.0, [finest]), 0.0, 0.25)
+    (gaussian,) = yield from portion(diffusion.steps(k1 * k2, [finest]), 0.25, 0.5)
+    # Averages of two numbers' sum and product need not be those of two numbers; then k1 = k2.
+    kappa = np.sqrt(np.maximum(2.0 * mean**2 - gaussian, mean**2))
+    lengths = [finest * LEVEL_RATIO**level for level in range(1, LEVELS)]
+    fields = yield from portion(diffusion.steps(kappa, lengths), 0.5, 1.0)
+    columns = [mesh.to_source(values) / mesh.edge for values in (kappa, *fields)]
+    return KappaLevels(np.stack(columns, axis=1), finest * mesh.edge)
