@@ -318,7 +318,7 @@ def _adjust(
     assert node is not None
     if display.shows_curvature(material):
         record.warnings.append(f"'{material.name}' was showing its curvature; skin is rendered.")
-        display.hide(bpy.context.scene, [material])
+        display.hide([material])
     if options.ratio:
         material.cdrf.sigma0_ratio = options.ratio
     if options.sigma0 and _free(material, node.inputs["Sigma0"]):
@@ -389,6 +389,8 @@ def _render_all(
             for frame in options.frames
             for sigma in sigmas
         ]
+        if options.curvature:
+            planned.append(options.output / f"{stem}_curvature.png")
         if all(_made(target, key, done) for target in planned) and not options.force:
             record.images = [_entry(target, key, 0.0, resumed=True) for target in planned]
             return
@@ -397,7 +399,13 @@ def _render_all(
     frames = options.frames or [scene.frame_current]
     own = {material.name: material.cdrf.sigma0 for material in translucent_materials()}
     if options.curvature:
-        _render_curvature(options.output / f"{stem}_curvature.png", options, record)
+        target = options.output / f"{stem}_curvature.png"
+        if not options.force and _made(target, key, done):
+            record.images.append(_entry(target, key, 0.0, resumed=True))
+        else:
+            if sigmas[0] is not None:
+                _set_sigma0(dict.fromkeys(own, sigmas[0]))
+            _render_curvature(target, key, options, record)
     total = len(frames) * len(sigmas)
     for number, frame in enumerate(frames):
         scene.frame_set(frame)
@@ -434,13 +442,19 @@ def _render_all(
         bpy.ops.wm.save_as_mainfile(filepath=str(saved.resolve()), copy=True)
 
 
-def _render_curvature(target: Path, options: argparse.Namespace, record: SceneRecord) -> None:
+def _render_curvature(
+    target: Path, key: str, options: argparse.Namespace, record: SceneRecord
+) -> None:
+    """Render the first frame's curvature, at the first sigma0 of the command line."""
+    start = time.perf_counter()
     skins = setup.skins_of(bpy.context.view_layer)
     if not skins:
         record.warnings.append("Nothing here has a curvature to show.")
         return
     with record.stage("render curvature"):
         legend.render_curvature(bpy.context.scene, skins, target, options.curvature)
+    record.images.append(_entry(target, key, time.perf_counter() - start, resumed=False))
+    note_done(options.output, target, key)
     say(f"  {target.name}")
 
 

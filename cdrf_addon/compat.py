@@ -3,6 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
 import bpy
 
 EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT"
@@ -14,6 +18,36 @@ def set_still_format(settings: bpy.types.ImageFormatSettings, kind: str) -> None
     if hasattr(settings, "media_type"):
         settings.media_type = "IMAGE"
     settings.file_format = kind
+
+
+@contextmanager
+def still_png(scene: bpy.types.Scene) -> Iterator[None]:
+    """Inside the block, EEVEE renders a whole, plain, single 8-bit PNG; then all is as before.
+
+    Formats depend on the media type, which is new in 5.0, so that comes first both ways.
+    """
+    settings = scene.render.image_settings
+    wanted: list[tuple[Any, str, Any]] = [
+        (scene.render, "engine", EEVEE),
+        (scene.render, "use_multiview", False),
+        (scene.render, "use_border", False),
+        (scene.render, "use_compositing", False),
+        (scene.render, "use_sequencer", False),
+        (settings, "media_type", "IMAGE"),
+        (settings, "file_format", "PNG"),
+        (settings, "color_mode", "RGB"),
+        (settings, "color_depth", "8"),
+        (settings, "color_management", "FOLLOW_SCENE"),
+    ]
+    wanted = [(owner, name, value) for owner, name, value in wanted if hasattr(owner, name)]
+    before = [(owner, name, getattr(owner, name)) for owner, name, _ in wanted]
+    try:
+        for owner, name, value in wanted:
+            setattr(owner, name, value)
+        yield
+    finally:
+        for owner, name, value in before:
+            setattr(owner, name, value)
 
 
 def ensure_node_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.ShaderNodeTree:

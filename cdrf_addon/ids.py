@@ -10,8 +10,9 @@ DIFFUSED_ATTRIBUTE: Final = "cdrf_diffused"
 """FLOAT_COLOR point attribute: kappa at four diffusion lengths (core/scale_space.py)."""
 FILLED_ATTRIBUTE: Final = "cdrf_filled"
 """FLOAT point attribute: 1 where no fit was possible; only on meshes that have such vertices."""
-LENGTH_KEY: Final = "cdrf_length"
-"""On a mesh: the shortest of those lengths, in world units."""
+LENGTH_ATTRIBUTE: Final = "cdrf_length"
+"""FLOAT point attribute: the shortest of those lengths, in world units. Not a custom property, as
+many modifiers make a mesh without them."""
 
 # --- node groups and images: all start with CDRF ------------------------------------------------
 PREFIX: Final = "CDRF"

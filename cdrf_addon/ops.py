@@ -234,7 +234,7 @@ class CDRF_OT_remove(bpy.types.Operator):
             materials.remove(material)
         rest = skins_of(context.view_layer)
         if not any(display.shows_curvature(skin) for skin in rest):
-            display.hide(context.scene, ())
+            display.hide(())
             viewport.restore(context)
         for item in users:
             if not skins_on(item) and item.data.is_editable:
@@ -273,6 +273,8 @@ class CDRF_OT_show_curvature(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
+        if ids.DISPLAY_KEY in context.scene:
+            return True  # whatever became of the objects since, it can be switched off
         if not translucent_objects(context.view_layer):
             cls.poll_message_set("Nothing is translucent yet: press Make Translucent first")
             return False
@@ -280,13 +282,17 @@ class CDRF_OT_show_curvature(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         skins = skins_of(context.view_layer)
-        showing = any(display.shows_curvature(skin) for skin in skins)
-        if self.display == "ON" or (self.display == "TOGGLE" and not showing):
-            display.show(context.scene, skins, self.quantity)
-            viewport.show_materials(context)
-        else:
-            display.hide(context.scene, skins)
+        showing = ids.DISPLAY_KEY in context.scene or any(map(display.shows_curvature, skins))
+        if self.display == "OFF" or (self.display == "TOGGLE" and showing):
+            display.hide(display.showing_materials())
             viewport.restore(context)
+            return {"FINISHED"}
+        try:
+            display.show(context.scene, skins, self.quantity)
+        except CdrfError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        viewport.show_materials(context)
         return {"FINISHED"}
 
 
@@ -309,7 +315,10 @@ class CDRF_OT_save_curvature(bpy.types.Operator):
         if context.scene.camera is None:
             cls.poll_message_set("The scene has no camera; add one first")
             return False
-        return CDRF_OT_show_curvature.poll.__func__(cls, context)  # type: ignore[attr-defined]
+        if not translucent_objects(context.view_layer):
+            cls.poll_message_set("Nothing is translucent yet: press Make Translucent first")
+            return False
+        return True
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)
@@ -320,13 +329,17 @@ class CDRF_OT_save_curvature(bpy.types.Operator):
         if not path.is_absolute():
             self.report({"ERROR"}, "Save the file first, or choose a folder for the picture.")
             return {"CANCELLED"}
-        path = path.with_suffix(".png")
+        if not path.name or path.is_dir():
+            self.report({"ERROR"}, "Choose a name for the picture, not only a folder.")
+            return {"CANCELLED"}
+        if path.suffix.lower() != ".png":
+            path = path.with_name(f"{path.name}.png")
         try:
             legend.render_curvature(
                 context.scene, skins_of(context.view_layer), path, self.quantity
             )
-        except (CdrfError, OSError) as error:
-            self.report({"ERROR"}, str(error))
+        except (CdrfError, OSError, RuntimeError) as error:
+            self.report({"ERROR"}, str(error).strip())
             return {"CANCELLED"}
         self.report({"INFO"}, f"CDRF: curvature saved as {path}")
         return {"FINISHED"}

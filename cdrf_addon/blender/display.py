@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from .. import ids
+from ..core.errors import SceneError
 from .groups import display_group
 from .materials import cdrf_node, skin_output, skin_socket
 from .nodetree import TreeBuilder
@@ -34,7 +35,14 @@ QUANTITIES = {
 """What can be shown: its title and what it means."""
 SIGNED_QUANTITIES = {"MEAN"}
 # Colours are shown as they are: a film-like view transform would not match the legend.
-_PLAIN = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
+_PLAIN = {
+    "view_transform": "Standard",
+    "look": "None",
+    "exposure": 0.0,
+    "gamma": 1.0,
+    "use_curve_mapping": False,
+    "use_white_balance": False,
+}
 
 
 def _display_nodes(material: bpy.types.Material) -> list[bpy.types.ShaderNode]:
@@ -45,6 +53,11 @@ def _display_nodes(material: bpy.types.Material) -> list[bpy.types.ShaderNode]:
 def shows_curvature(material: bpy.types.Material) -> bool:
     """Tell whether the material shows its curvature just now."""
     return bool(_display_nodes(material))
+
+
+def showing_materials() -> list[bpy.types.Material]:
+    """List the materials of the file that show their curvature just now."""
+    return [item for item in bpy.data.materials if shows_curvature(item)]
 
 
 def value_range(meshes: Iterable[bpy.types.Mesh], quantity: str) -> tuple[float, float]:
@@ -70,36 +83,65 @@ def show(
         scene: Its view settings are kept for `hide`.
         skins: The translucent materials, each with the meshes that show it.
         quantity: A key of QUANTITIES.
+
+    Raises:
+        SceneError: None of the materials can show it.
     """
+    skins = {skin: meshes for skin, meshes in skins.items() if skin_output(skin) is not None}
+    if not skins:
+        raise SceneError("The CDRF Material Output was deleted: press Update first.")
     low, high = value_range({mesh for meshes in skins.values() for mesh in meshes}, quantity)
     for material in skins:
         show_skin(material)
         _show_on(material, quantity, low, high)
     view = scene.view_settings
     kept = scene.get(ids.DISPLAY_KEY)
-    before = kept["before"].to_dict() if kept else {name: getattr(view, name) for name in _PLAIN}
+    if kept is not None:
+        before = kept["before"].to_dict()
+    else:
+        before = {name: getattr(view, name) for name in _PLAIN if hasattr(view, name)}
     scene[ids.DISPLAY_KEY] = {"quantity": quantity, "low": low, "high": high, "before": before}
-    for name, value in _PLAIN.items():
-        setattr(view, name, value)
+    for name in before:
+        _set(view, name, _PLAIN[name])
 
 
-def hide(scene: bpy.types.Scene, skins: Iterable[bpy.types.Material]) -> None:
-    """Show the skins again, with the view settings there were."""
+def hide(skins: Iterable[bpy.types.Material]) -> None:
+    """Show the skins again, with the view settings there were, in every scene that showed them.
+
+    A view setting that was changed meanwhile stays as it is.
+    """
     for material in skins:
         show_skin(material)
-    kept = scene.get(ids.DISPLAY_KEY)
-    if kept is not None:
+    for scene in bpy.data.scenes:
+        kept = scene.get(ids.DISPLAY_KEY)
+        if kept is None or any(shows_curvature(skin) for skin in _materials_in(scene)):
+            continue
+        view = scene.view_settings
         for name, value in kept["before"].to_dict().items():
-            setattr(scene.view_settings, name, value)
+            if getattr(view, name) == _PLAIN[name]:
+                _set(view, name, value)
         del scene[ids.DISPLAY_KEY]
+
+
+def _set(view: bpy.types.ColorManagedViewSettings, name: str, value: Any) -> None:
+    try:
+        setattr(view, name, value)
+    except TypeError:
+        # A studio's colour configuration need not have Blender's transforms; the colours of the
+        # legend are then a little off, which is no reason to stop.
+        return
+
+
+def _materials_in(scene: bpy.types.Scene) -> set[bpy.types.Material]:
+    slots = (slot for item in scene.objects for slot in item.material_slots)
+    return {slot.material for slot in slots if cdrf_node(slot.material) is not None}
 
 
 def refresh(scene: bpy.types.Scene, skins: dict[bpy.types.Material, list[bpy.types.Mesh]]) -> None:
     """Bring the materials that show curvature up to date with new curvature and node groups."""
     kept = scene.get(ids.DISPLAY_KEY)
-    shown = {skin: meshes for skin, meshes in skins.items() if shows_curvature(skin)}
-    if kept is not None and shown:
-        show(scene, shown, kept["quantity"])
+    if kept is not None and any(shows_curvature(skin) for skin in skins):
+        show(scene, skins, kept["quantity"])
 
 
 def show_skin(material: bpy.types.Material) -> None:

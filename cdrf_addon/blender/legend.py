@@ -12,13 +12,15 @@ import imbuf
 import numpy as np
 
 from .. import ids
-from ..compat import EEVEE, set_still_format
+from ..compat import still_png
 from ..core.colour_scale import HOT, SIGNED, Scale, colours, srgb, ticks
 from . import display
 from .display import QUANTITIES, SIGNED_QUANTITIES
 from .stage import render_to
 
 STEPS = 64
+# Smaller pictures have no room for a legend.
+LEAST_PIXELS = 96
 _handlers: list[Any] = []
 
 
@@ -88,6 +90,9 @@ def add_to_picture(scene: bpy.types.Scene, path: Path) -> None:
     image = bpy.data.images.load(str(path))
     image.colorspace_settings.name = "Non-Color"
     width, height = image.size
+    if min(width, height) < LEAST_PIXELS:
+        bpy.data.images.remove(image)
+        return
     pixels = np.empty(width * height * 4, dtype=np.float32)
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(height, width, 4)
@@ -128,24 +133,15 @@ def render_curvature(
     Raises:
         SceneError: No picture was written.
     """
-    shown = {skin for skin in skins if display.shows_curvature(skin)}
+    shown = {skin: meshes for skin, meshes in skins.items() if display.shows_curvature(skin)}
     kept = scene.get(ids.DISPLAY_KEY)
     kept_quantity = kept["quantity"] if kept else quantity
-    render = scene.render
-    engine = render.engine
-    settings = render.image_settings
-    output = settings.file_format, settings.color_depth
     display.show(scene, skins, quantity)
     try:
-        render.engine = EEVEE
-        set_still_format(settings, "PNG")
-        settings.color_depth = "8"
-        render_to(path)
+        with still_png(scene):
+            render_to(path)
         add_to_picture(scene, path)
     finally:
-        render.engine = engine
-        set_still_format(settings, output[0])
-        settings.color_depth = output[1]
-        display.hide(scene, skins)
+        display.hide(skins)
         if shown:
-            display.show(scene, {skin: skins[skin] for skin in shown}, kept_quantity)
+            display.show(scene, shown, kept_quantity)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Bumped when the same mesh would give another curvature.
-ESTIMATOR_VERSION = 2
+ESTIMATOR_VERSION = 3
 ORIGIN_ATTRIBUTE = ".cdrf_origin"
 
 
@@ -88,7 +88,8 @@ def read_shape(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: 
         MeshError: It has no faces, or its scale is zero along an axis.
     """
     linear = linear_part(item)
-    if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) < 1e-30:
+    size = float(np.linalg.norm(linear))
+    if not (np.isfinite(size) and abs(np.linalg.det(linear)) > 1e-12 * size**3 > 0.0):
         raise MeshError(
             f"'{item.name}' has a scale of zero along an axis; give it a size (N panel > Scale)."
         )
@@ -115,11 +116,11 @@ def read_shape(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: 
     metric = linear.T @ linear
     # Rounded, so that turning an object, which changes the last digits, recomputes nothing.
     rounded = np.round(metric / np.trace(metric), 6) + 0.0
-    size = float(f"{np.trace(metric):.6g}")
+    square = float(f"{np.trace(metric):.6g}")
     fingerprint = _digest(
         local_fingerprint.encode(),
         rounded.tobytes(),
-        repr((size, options.method, options.radius, ESTIMATOR_VERSION)).encode(),
+        repr((square, options.method, options.radius, ESTIMATOR_VERSION)).encode(),
         f"{options.crease_angle:.5g}".encode(),
     )
     with np.errstate(invalid="ignore", over="ignore"):
@@ -259,11 +260,14 @@ def _only_deforms(item: bpy.types.Object, evaluated_count: int) -> bool:
     )
 
 
+_COLOURS = (ids.CURVATURE_ATTRIBUTE, ids.DIFFUSED_ATTRIBUTE)
+
+
 def write_curvature(
     mesh: bpy.types.Mesh,
     principal: NDArray[np.float32],
     levels: NDArray[np.float32],
-    finest: float,
+    finest: NDArray[np.float32],
 ) -> None:
     """Store a mesh's curvature.
 
@@ -271,26 +275,32 @@ def write_curvature(
         mesh: The mesh.
         principal: (n, 4) kappa, k1, k2, signed mean.
         levels: (n, 4) kappa at four diffusion lengths.
-        finest: The shortest of those lengths, in world units.
+        finest: (n,) the shortest of those lengths, in world units.
     """
     _write_colours(mesh, ids.CURVATURE_ATTRIBUTE, principal)
     _write_colours(mesh, ids.DIFFUSED_ATTRIBUTE, levels)
-    mesh[ids.LENGTH_KEY] = finest
+    _write_floats(mesh, ids.LENGTH_ATTRIBUTE, finest)
     mesh.update_tag()
 
 
 def mark_filled(mesh: bpy.types.Mesh, filled: NDArray[np.bool_]) -> None:
     """Mark the vertices whose curvature comes from their neighbours; no mark, no attribute."""
-    attribute = mesh.attributes.get(ids.FILLED_ATTRIBUTE)
-    if attribute is not None:
-        mesh.attributes.remove(attribute)
     if filled.any():
-        attribute = mesh.attributes.new(ids.FILLED_ATTRIBUTE, "FLOAT", "POINT")
-        attribute.data.foreach_set("value", filled.astype(np.float32))
+        _write_floats(mesh, ids.FILLED_ATTRIBUTE, filled.astype(np.float32))
+    elif ids.FILLED_ATTRIBUTE in mesh.attributes:
+        mesh.attributes.remove(mesh.attributes[ids.FILLED_ATTRIBUTE])
+
+
+def _write_floats(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32]) -> None:
+    if name in mesh.attributes and not _holds(mesh, name, "FLOAT"):
+        mesh.attributes.remove(mesh.attributes[name])
+    if name not in mesh.attributes:
+        mesh.attributes.new(name, "FLOAT", "POINT")
+    mesh.attributes[name].data.foreach_set("value", np.ascontiguousarray(values))
 
 
 def _write_colours(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32]) -> None:
-    if name in mesh.attributes and not _holds_colours(mesh, name):
+    if name in mesh.attributes and not _holds(mesh, name, "FLOAT_COLOR"):
         mesh.attributes.remove(mesh.attributes[name])
     if name not in mesh.attributes:
         # The first colour attribute of a mesh becomes the one to paint on: leave that as it was.
@@ -306,26 +316,20 @@ def _write_colours(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32])
 
 def remove_curvature(mesh: bpy.types.Mesh) -> None:
     """Take the attributes off a mesh that does not need them."""
-    for name in (ids.CURVATURE_ATTRIBUTE, ids.DIFFUSED_ATTRIBUTE, ids.FILLED_ATTRIBUTE):
+    for name in (*_COLOURS, ids.LENGTH_ATTRIBUTE, ids.FILLED_ATTRIBUTE):
         attribute = mesh.attributes.get(name)
         if attribute is not None:
             mesh.attributes.remove(attribute)
             mesh.update_tag()
-    if ids.LENGTH_KEY in mesh:
-        del mesh[ids.LENGTH_KEY]
 
 
 def has_curvature(mesh: bpy.types.Mesh) -> bool:
     """Tell whether a mesh carries the attributes in the form the shader reads."""
-    return ids.LENGTH_KEY in mesh and all(
-        _holds_colours(mesh, name) for name in (ids.CURVATURE_ATTRIBUTE, ids.DIFFUSED_ATTRIBUTE)
+    return _holds(mesh, ids.LENGTH_ATTRIBUTE, "FLOAT") and all(
+        _holds(mesh, name, "FLOAT_COLOR") for name in _COLOURS
     )
 
 
-def _holds_colours(mesh: bpy.types.Mesh, name: str) -> bool:
+def _holds(mesh: bpy.types.Mesh, name: str, kind: str) -> bool:
     attribute = mesh.attributes.get(name)
-    return (
-        attribute is not None
-        and attribute.data_type == "FLOAT_COLOR"
-        and attribute.domain == "POINT"
-    )
+    return attribute is not None and attribute.data_type == kind and attribute.domain == "POINT"

@@ -97,9 +97,8 @@ class _MeshWork:
     summary: CurvatureSummary | None = None
     """None where nothing had to be computed."""
     values: NDArray[np.float32] | None = None
-    """(n, 9): kappa, k1, k2, signed mean, kappa at four diffusion lengths, and 1 where filled."""
-    finest: float = 1.0
-    """The shortest of those lengths."""
+    """(n, 10): kappa, k1, k2, signed mean; kappa at four diffusion lengths, the shortest of these
+    lengths; 1 where filled."""
     evaluated_vertices: int = 0
     options: Options = DEFAULT_OPTIONS
     seconds: float = 0.0
@@ -290,7 +289,7 @@ class Setup:
                 "nearest point. Apply the modifiers for exact values."
             )
         noise = coordinate_noise(shape.mesh)
-        if noise > COARSE_COORDINATES * work.summary.median and work.summary.kind != FLAT:
+        if work.summary.kind != FLAT and noise > COARSE_COORDINATES * work.summary.median > 0.0:
             work.warnings.append(
                 "The mesh lies far from its origin, where coordinates are coarse, so its curvature "
                 "is noisy: set the origin to the geometry (Object > Set Origin) and update."
@@ -300,10 +299,10 @@ class Setup:
     def _measure(
         self, work: _MeshWork, shape: Shape
     ) -> Generator[float, None, NDArray[np.float32]]:
-        """Measure and sum up a shape's curvature; return what is stored, (n, 9)."""
+        """Measure and sum up a shape's curvature; return what is stored, (n, 10)."""
         if is_faceted(shape.mesh):
             work.summary = FLAT_SUMMARY
-            return np.zeros((len(shape.mesh.vertices), 4 + LEVELS + 1), dtype=np.float32)
+            return np.zeros((len(shape.mesh.vertices), 4 + LEVELS + 2), dtype=np.float32)
         cleaned: CleanCurvature | None = None
         found = sphere_curvature(shape.mesh)
         if found is None:
@@ -313,11 +312,12 @@ class Setup:
         work.warnings = found.sentences()
         principal = np.stack((found.kappa, found.k1, found.k2, found.mean), axis=1)
         levels = np.repeat(found.kappa[:, None], LEVELS, axis=1)
+        finest = np.ones_like(found.kappa)
         if cleaned is not None and work.summary.kind == VARYING:
             diffused = yield from portion(level_steps(cleaned), 0.75, 1.0)
-            levels, work.finest = diffused.values, diffused.finest
+            levels, finest = diffused.values, diffused.finest
         limit = np.finfo(np.float32).max
-        values = np.concatenate((principal, levels, found.filled[:, None]), axis=1)
+        values = np.column_stack((principal, levels, finest, found.filled))
         return np.clip(values, -limit, limit).astype(np.float32)
 
     def _relative_size(
@@ -387,14 +387,15 @@ class Setup:
         if not read & {shader.ATTRIBUTE, shader.SCALED}:
             remove_curvature(work.mesh)
         elif work.values is not None:
-            principal, levels, filled = np.split(work.values, (4, 4 + LEVELS), axis=1)
-            write_curvature(work.mesh, principal, levels, work.finest)
-            mark_filled(work.mesh, filled[:, 0] > 0.5)
+            principal, levels, rest = np.split(work.values, (4, 4 + LEVELS), axis=1)
+            write_curvature(work.mesh, principal, levels, rest[:, 0])
+            mark_filled(work.mesh, rest[:, 1] > 0.5)
         elif not has_curvature(work.mesh):
             # A constant mesh that now shares its material with one that is not.
             constant = np.array(work.mean_values, dtype=np.float32)
             principal = np.tile(constant, (len(work.mesh.vertices), 1))
-            write_curvature(work.mesh, principal, np.repeat(principal[:, :1], LEVELS, axis=1), 1.0)
+            levels = np.repeat(principal[:, :1], LEVELS, axis=1)
+            write_curvature(work.mesh, principal, levels, np.ones_like(principal[:, 0]))
         for item in work.users:
             scaled = any(sources.get(m) == shader.SCALED for m in _materials(item))
             if scaled:

@@ -25,7 +25,7 @@ from .groups import diffused_group, light_group, reflectance_group
 from .lights import SceneLight, drive_light
 from .nodetree import TreeBuilder, declare, is_intact, rebuild
 
-VERSION = 3
+VERSION = 4
 
 FLAT, CONSTANT, ATTRIBUTE, SCALED = "flat", "constant", "attribute", "scaled attribute"
 """Where kappa comes from: nowhere, the Curvature input, the mesh, the mesh and the object."""
@@ -246,7 +246,7 @@ def _diffused_sigma(b: TreeBuilder, variant: Variant, given: Any) -> Any:
 def level_nodes(b: TreeBuilder) -> dict[str, Any]:
     """What a mesh stores of its diffused curvature, by the sockets of `diffused_group`."""
     levels = b.node("ShaderNodeAttribute", attribute_name=ids.DIFFUSED_ATTRIBUTE)
-    length = b.node("ShaderNodeAttribute", attribute_type="OBJECT", attribute_name=ids.LENGTH_KEY)
+    length = b.node("ShaderNodeAttribute", attribute_name=ids.LENGTH_ATTRIBUTE)
     return {
         ids.LEVELS: levels.outputs["Color"],
         ids.LEVELS_ALPHA: levels.outputs["Alpha"],

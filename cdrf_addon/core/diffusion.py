@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fields diffused over a surface by implicit heat steps: (M + l^2 / 2 L) x = M b.
 
-M holds the vertex areas, L is the cotangent Laplacian (Pinkall and Polthier 1993, by libigl) with
-its negative weights set to zero, so that bad triangles cannot make a field overshoot. A step of
-length l blurs like a kernel of variance l^2 per axis. The mean of the field over the surface does
-not change.
+M holds the vertex areas, L is the cotangent Laplacian (Pinkall and Polthier 1993, by libigl), in
+which needle triangles are softened. A step of length l blurs like a kernel of variance l^2 per
+axis. The mean of the field over each component of the surface does not change.
 
 A field blurred over l does not need triangles much smaller than l: on large meshes, long steps are
 solved on a coarser mesh, whose vertices are the patches of the surface that share a cell of a grid.
@@ -25,7 +24,9 @@ from .topology import face_normals, scatter
 if TYPE_CHECKING:
     from .mesh import CleanMesh, Indices, Points
 
-# Needle triangles tie their near vertices together this much at most; more only stalls the solver.
+# Half a cotangent beyond this is a needle's (angles below 0.3 degrees): its negative weights are
+# left out and the others end here, as more only stalls the solver. All other triangles keep theirs,
+# also the negative ones: without them a field on sheared triangles is blurred half as far.
 WEIGHT_LIMIT = 100.0
 # Up to this many vertices no step is long enough to be worth a coarser mesh.
 COARSE_ABOVE = 20_000
@@ -33,6 +34,10 @@ COARSE_ABOVE = 20_000
 CELLS_PER_LENGTH = 6.0
 # A coarse mesh is worth its making from this cell size on, in median edges.
 COARSE_FROM = 1.6
+# Components for which the cells would be smaller than this keep their vertices.
+LEAST_CELL = 1e-3
+# Times the median face, beyond which a face says nothing of its component's size.
+LARGEST_FACE = 100.0
 # Residual of the conjugate gradients, as a part of the right-hand side. Gaussian curvature spans
 # six decades on a head; at 1e-3, kappa in its flat parts was 33 % off at the worst vertex, now 0.4.
 RESIDUAL = 1e-5
@@ -52,7 +57,7 @@ class _Level:
 
     @cached_property
     def weights(self) -> Any:
-        """Cotangent weights between neighbours, >= 0, (n, n) sparse, empty diagonal."""
+        """Cotangent weights between neighbours, (n, n) sparse, empty diagonal."""
         from scipy.sparse import csr_array
 
         from .estimators.libigl import import_igl
@@ -60,24 +65,34 @@ class _Level:
         count = len(self.vertices)
         if not len(self.triangles):
             return csr_array((count, count))
-        laplacian = csr_array(import_igl().cotmatrix(self.vertices, self.triangles))
-        laplacian.resize((count, count))
-        laplacian.setdiag(0.0)
-        laplacian.data = np.clip(laplacian.data, 0.0, WEIGHT_LIMIT)
-        laplacian.eliminate_zeros()
-        return laplacian
+        halves = import_igl().cotmatrix_entries(self.vertices, self.triangles)
+        needle = (np.abs(halves) > WEIGHT_LIMIT).any(axis=1)
+        if needle.any():
+            halves[needle] = np.clip(halves[needle], 0.0, WEIGHT_LIMIT)
+        # Column i belongs to the edge opposite corner i.
+        tail, head = (np.roll(self.triangles, -shift, axis=1).ravel() for shift in (1, 2))
+        weights = halves.ravel()
+        one_way = csr_array((weights, (tail, head)), (count, count))
+        return csr_array(one_way + one_way.T)
 
     @cached_property
     def valences(self) -> Points:
         """Diagonal of L: the sum of the weights at each vertex."""
         return np.asarray(self.weights.sum(axis=1)).ravel()
 
-    def solve_steps(self, right: Points, length: float) -> Generator[None, None, Points]:
-        """Take one heat step, pausing now and then; `right` is M b, (n,)."""
+    def solve_steps(self, right: Points, length: Points) -> Generator[None, None, Points]:
+        """Take one heat step, pausing now and then.
+
+        Args:
+            right: M b, (n,).
+            length: (n,) one length for each component.
+        """
         time = length**2 / 2.0
         diagonal = self.areas + time * self.valences
+        coupling = self.weights.copy()
+        coupling.data *= np.repeat(time, np.diff(coupling.indptr))
         yield
-        found = yield from conjugate_gradients(diagonal, self.weights * time, right)
+        found = yield from conjugate_gradients(diagonal, coupling, right)
         return found
 
 
@@ -91,7 +106,7 @@ def conjugate_gradients(
 
     Args:
         diagonal: (n,) positive.
-        coupling: (n, n) sparse, symmetric, >= 0, row sums below the diagonal.
+        coupling: (n, n) sparse, symmetric, such that the whole is positive definite.
         right: (n,).
 
     Returns:
@@ -186,18 +201,19 @@ def _cells(places: Points) -> Indices:
     corner = np.round(places)
     middle = np.floor(places) + 0.5
     nearer = ((places - middle) ** 2).sum(axis=1) < ((places - corner) ** 2).sum(axis=1)
+    # Two cells far apart may get one number: vertices are merged only where an edge joins them.
     cell = (2.0 * np.where(nearer[:, None], middle, corner)).astype(np.int64)
-    return (cell[:, 0] << 42) | (cell[:, 1] << 21) | cell[:, 2]
+    return (cell[:, 0] << 42) + (cell[:, 1] << 21) + cell[:, 2]
 
 
-def _coarsen(fine: _Level, cell: float) -> _Coarse:
-    """Merge the vertices that share a grid cell and are joined within it."""
+def _coarsen(fine: _Level, cell: Points) -> _Coarse:
+    """Merge the vertices that share a grid cell, of a size of its own, and are joined within it."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     vertices, triangles = fine.vertices, fine.triangles
     count = len(vertices)
-    key = _cells((vertices - vertices.min(axis=0)) / cell)
+    key = _cells(vertices / cell[:, None])
     tail, head = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
     within = key[tail] == key[head]
     joined = np.ones(int(within.sum()), dtype=np.int8), (tail[within], head[within])
@@ -234,36 +250,62 @@ class Diffusion:
         areas = scatter(mesh.triangles, doubled_area / 6.0, len(mesh.vertices))
         self._fine = _Level(mesh.vertices, mesh.triangles, areas)
 
-    @property
-    def area(self) -> float:
-        """Area of the surface."""
-        return float(self._fine.areas.sum())
+        self._doubled_area = doubled_area
+
+    def size(self) -> Points:
+        """Square root of the area of the component that each vertex belongs to, (n,).
+
+        A face counts for at most a hundred times its component's median face, so that a vertex that
+        has flown off does not change the size of the rest.
+        """
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        triangles = self._fine.triangles
+        count = len(self._fine.vertices)
+        ends = np.roll(triangles, -1, axis=1).ravel(), triangles.ravel()
+        edges = coo_array((np.ones(triangles.size, dtype=np.int8), ends), (count, count))
+        components, part = connected_components(edges, directed=False)
+        of_face = part[triangles[:, 0]]
+        order = np.lexsort((self._doubled_area, of_face)) if components > 1 else None
+        ranked = np.sort(self._doubled_area) if order is None else self._doubled_area[order]
+        faces = np.bincount(of_face, minlength=components)
+        middle = ranked[np.cumsum(faces) - faces + faces // 2]
+        bounded = np.minimum(self._doubled_area, LARGEST_FACE * middle[of_face])
+        area = np.bincount(of_face, bounded / 2.0, minlength=components)
+        return np.asarray(np.sqrt(area)[part])
 
     def steps(
-        self, values: Points, lengths: Sequence[float]
+        self, values: Points, lengths: Sequence[Points]
     ) -> Generator[float, None, list[Points]]:
         """Diffuse a field over each of some lengths, yielding the part done.
 
         Args:
             values: (n,) at the vertices.
-            lengths: Standard deviations of the blur, ascending.
+            lengths: Standard deviations of the blur, (n,) each, one number for each component of
+                the surface; ascending.
 
         Returns:
             An array (n,) for each length, within the range of the values.
         """
         low, high = values.min(), values.max()
         level, right = self._fine, self._fine.areas * values
+        first = np.arange(len(values))
         coarser: list[_Coarse] = []
         found = []
         for done, length in enumerate(lengths):
             part = done / len(lengths)
             yield part
-            cell = length / CELLS_PER_LENGTH
-            if cell >= COARSE_FROM and len(values) > COARSE_ABOVE:
-                coarser.append(_coarsen(level, cell))
+            cell = length[first] / CELLS_PER_LENGTH
+            if cell.max() >= COARSE_FROM and len(values) > COARSE_ABOVE:
+                coarser.append(_coarsen(level, np.maximum(cell, LEAST_CELL)))
                 level, right = coarser[-1].level, coarser[-1].restrict(right)
+                # A vertex of each patch stands for its component.
+                standing = np.empty(len(level.areas), dtype=np.int64)
+                standing[coarser[-1].patch] = first
+                first = standing
                 yield part
-            solving = level.solve_steps(right, length)
+            solving = level.solve_steps(right, length[first])
             result = yield from with_progress(solving, (done + 0.9) / len(lengths))
             for coarse in reversed(coarser):
                 result = coarse.prolong(result)

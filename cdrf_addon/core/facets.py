@@ -35,6 +35,10 @@ def is_faceted(mesh: TriMesh) -> bool:
         if not (doubled_area > 0.0).all() or not np.isfinite(doubled_area).all():
             return False
         unit = normal / doubled_area
+    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    directed = np.sort(tail * len(vertices) + head)
+    if (directed[1:] == directed[:-1]).any():
+        return False  # doubled or flipped faces: not for this quick look to judge
     face, other, _, _ = shared_edges(triangles, len(vertices))
     for some in (slice(0, SAMPLE), slice(SAMPLE, None)):
         cosine = (unit[:, face[some]] * unit[:, other[some]]).sum(axis=0)

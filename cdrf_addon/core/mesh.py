@@ -89,6 +89,11 @@ class CleaningReport:
             (self.degenerate_faces, "{} faces have no area; ignored."),
             (self.duplicate_faces, "{} faces lie twice on the same vertices; used once."),
             (self.hub_vertices, "{} vertices join too many edges; filled from their neighbours."),
+            (
+                self.crease_vertices,
+                "{} vertices were added where creases are split; raise the angle "
+                "if round parts are split too.",
+            ),
             (self.flipped_faces, "{} faces point the other way (Recalculate Normals mends it)."),
         ]
         lines = [text.format(f"{count:,}") for count, text in told if count]

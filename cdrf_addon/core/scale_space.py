@@ -36,14 +36,15 @@ class KappaLevels:
 
     values: Points
     """(N, LEVELS) kappa, 1/unit; column i at the length finest * LEVEL_RATIO^i."""
-    finest: float
-    """The shortest length."""
+    finest: Points
+    """(N,) the shortest length; one number for each component of the surface."""
 
     def at(self, length: float) -> Points:
         """Kappa at a length, (N,), linear in its logarithm between the stored ones."""
-        place = np.log(max(length / self.finest, 1.0)) / np.log(LEVEL_RATIO)
-        weights = np.clip(1.0 - np.abs(np.arange(LEVELS) - min(place, LEVELS - 1.0)), 0.0, 1.0)
-        return np.asarray(self.values @ weights)
+        place = np.log(np.maximum(length / self.finest, 1.0)) / np.log(LEVEL_RATIO)
+        place = np.minimum(place, LEVELS - 1.0)[:, None]
+        weights = np.clip(1.0 - np.abs(np.arange(LEVELS) - place), 0.0, 1.0)
+        return np.asarray((self.values * weights).sum(axis=1))
 
 
 def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels]:
@@ -53,12 +54,12 @@ def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels
     noise of a scan averages out of them, which it does not of kappa = sqrt(2 mean^2 - Gaussian).
     Then that kappa over the longer ones.
 
-    The lengths are parts of the square root of the area, not of the edges: the same shape has the
-    same levels however finely it is divided.
+    The lengths are parts of the square root of a component's area, not of its edges: the same shape
+    has the same levels however finely it is divided and whatever else the mesh holds.
     """
     mesh = curvature.mesh
     diffusion = Diffusion(mesh)
-    finest = float(np.sqrt(diffusion.area)) / LEVEL_RATIO**LEVELS
+    finest = diffusion.size() / LEVEL_RATIO**LEVELS
     k1, k2 = curvature.k1, curvature.k2
     (mean,) = yield from portion(diffusion.steps((k1 + k2) / 2.0, [finest]), 0.0, 0.25)
     (gaussian,) = yield from portion(diffusion.steps(k1 * k2, [finest]), 0.25, 0.5)
@@ -67,4 +68,4 @@ def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels
     lengths = [finest * LEVEL_RATIO**level for level in range(1, LEVELS)]
     fields = yield from portion(diffusion.steps(kappa, lengths), 0.5, 1.0)
     columns = [mesh.to_source(values) / mesh.edge for values in (kappa, *fields)]
-    return KappaLevels(np.stack(columns, axis=1), finest * mesh.edge)
+    return KappaLevels(np.stack(columns, axis=1), mesh.to_source(finest, loose=1.0) * mesh.edge)

@@ -52,7 +52,8 @@ def test_levels_are_stored_in_world_units(rig: Rig) -> None:
     item = ring()
     bpy.ops.cdrf.setup()
     area = 4.0 * math.pi**2 * 0.4
-    assert item.data[ids.LENGTH_KEY] == pytest.approx(math.sqrt(area) / 256.0, rel=0.01)
+    length = item.data.attributes[ids.LENGTH_ATTRIBUTE].data[7].value
+    assert length == pytest.approx(math.sqrt(area) / 256.0, rel=0.01)
     levels = stored(item.data, ids.DIFFUSED_ATTRIBUTE)
     kappa = stored(item.data, ids.CURVATURE_ATTRIBUTE)[:, 0]
     assert np.abs(levels[:, 0] - kappa).max() <= 0.02 * kappa.max()
@@ -177,3 +178,18 @@ def test_a_finer_mesh_of_the_same_shape_shades_alike(rig: Rig) -> None:
     ]
     assert math.sqrt((added[1] ** 2).mean()) > 0.05
     assert math.sqrt(((added[0] - added[1]) ** 2).mean()) <= 0.01
+
+
+@pytest.mark.smoke
+@pytest.mark.parametrize("kind", ["TRIANGULATE", "MIRROR", "SOLIDIFY", "ARRAY", "EDGE_SPLIT"])
+def test_lengths_reach_the_shader_through_modifiers(rig: Rig, kind: str) -> None:
+    item = ring()
+    item.modifiers.new("Modifier", kind)
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    stored_length = item.data.attributes[ids.LENGTH_ATTRIBUTE].data[0].value
+    evaluated = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh()
+    values = np.empty(len(mesh.vertices), dtype=np.float32)
+    mesh.attributes[ids.LENGTH_ATTRIBUTE].data.foreach_get("value", values)
+    evaluated.to_mesh_clear()
+    assert values == pytest.approx(np.full(len(values), stored_length), rel=1e-5)

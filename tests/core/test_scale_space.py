@@ -12,6 +12,7 @@ from cdrf_addon.core.curvature import curvature_steps
 from cdrf_addon.core.mesh import TriMesh
 from cdrf_addon.core.progress import run_steps
 from cdrf_addon.core.scale_space import LEVEL_RATIO, LEVELS, KappaLevels, level_steps
+from tests.core.test_mesh import plane
 
 # Difference between the finest levels of 2,000 and of 60,000 vertices, in units of the mean kappa:
 # the coarse mesh's own error of curvature, some percent.
@@ -30,7 +31,7 @@ def test_lengths_follow_the_size() -> None:
     one = levels_of(surface.vertices, surface.triangles)
     other = levels_of(surface.vertices * 1e-3, surface.triangles)
     area = 4.0 * np.pi**2 * 0.4
-    assert one.finest == pytest.approx(np.sqrt(area) / LEVEL_RATIO**LEVELS, rel=0.01)
+    assert one.finest[0] == pytest.approx(np.sqrt(area) / LEVEL_RATIO**LEVELS, rel=0.01)
     assert other.finest == pytest.approx(one.finest * 1e-3, rel=1e-9)
     assert other.values == pytest.approx(one.values * 1e3, rel=1e-6)
 
@@ -45,12 +46,12 @@ def test_the_same_shape_has_the_same_levels_at_any_resolution(make) -> None:
     for level in range(LEVELS):
         apart = coarse.values[:, level] - fine.values[at, level]
         assert np.sqrt((apart**2).mean()) <= RESOLUTION * scale, level
-    assert coarse.finest == pytest.approx(fine.finest, rel=0.01)
+    assert coarse.finest[0] == pytest.approx(fine.finest[0], rel=0.01)
 
 
 @pytest.mark.smoke
 def test_between_the_levels() -> None:
-    levels = KappaLevels(np.array([[4.0, 3.0, 1.0, 0.5]]), 0.1)
+    levels = KappaLevels(np.array([[4.0, 3.0, 1.0, 0.5]]), np.array([0.1]))
     middle = 0.1 * np.sqrt(LEVEL_RATIO)
     lengths = (0.0, 0.05, 0.1, middle, 0.1 * LEVEL_RATIO, 0.1 * LEVEL_RATIO**3, 1e9)
     found = [float(levels.at(length)[0]) for length in lengths]
@@ -72,3 +73,20 @@ def test_noise_averages_out() -> None:
     for level in range(1, LEVELS):
         apart = levels.values[:, level] - exact[:, level]
         assert np.sqrt((apart**2).mean()) <= NOISE * scale
+
+
+def test_other_components_and_stray_vertices_do_not_matter() -> None:
+    surface = torus(3_000)
+    alone = levels_of(surface.vertices * 0.1, surface.triangles)
+    floor, faces = plane(60)
+    both = levels_of(
+        np.concatenate((surface.vertices * 0.1, floor + 5.0)),
+        np.concatenate((surface.triangles, faces + len(surface.vertices))),
+    )
+    count = len(surface.vertices)
+    assert both.finest[:count] == pytest.approx(alone.finest, rel=1e-9)
+    assert both.values[:count] == pytest.approx(alone.values, rel=1e-3)
+    flown = surface.vertices * 0.1
+    flown[17] *= 1e4
+    stray = levels_of(flown, surface.triangles)
+    assert stray.finest[0] == pytest.approx(alone.finest[0], rel=0.15)

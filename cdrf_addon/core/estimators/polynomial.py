@@ -25,8 +25,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..progress import portion
 from ..topology import NORMAL_LIMIT, adjacency, hubs, vertex_normals
 from .estimate import Estimate
+from .least_squares import PIVOT_LIMIT, solve
+from .tensor import tensor_steps
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,6 +37,8 @@ if TYPE_CHECKING:
     from ..mesh import CleanMesh, Indices, Points
 
 Exponents = tuple[int, int]
+_Block = tuple[int, int, Estimate, "NDArray[np.bool_]"]
+"""First vertex, end, result, and which vertices' rings are much longer than wide."""
 
 QUADRIC: tuple[Exponents, ...] = ((2, 0), (1, 1), (0, 2), (1, 0), (0, 1))
 CUBIC: tuple[Exponents, ...] = (*QUADRIC, (3, 0), (2, 1), (1, 2), (0, 3))
@@ -42,13 +47,12 @@ GOLDFEATHER: tuple[Exponents, ...] = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1
 # Pairs of a vertex and a neighbour in a block: their arrays just fit into a core's cache.
 BLOCK_PAIRS = 60_000
 BLOCKS_AT_ONCE = 16
-# Part of a diagonal entry that elimination must leave for the points to determine the fit. A cubic
-# that is hardly determined swings wildly; there the quadric takes over.
-PIVOT_LIMIT, CUBIC_PIVOT_LIMIT = 1e-8, 1e-3
+# A cubic that is hardly determined swings wildly; there the quadric takes over.
+CUBIC_PIVOT_LIMIT = 1e-3
 # Squared distance of the rings' centre from the vertex, in units of their squared extent, above
 # which they are one-sided, as at a border (0.6 there, 0.17 a row further in), and take the quadric.
 ONE_SIDED = 0.1
-# Rings longer than wide by the square root of this get axes along and across.
+# Variance across over variance along, below which rings count as long: 4.5 times as long as wide.
 ELONGATED = 0.05
 
 
@@ -81,21 +85,28 @@ def polynomial_steps(
     fit = _Fit(mesh.vertices, normals, used & sound, tuple(terms), use_normals)
     result = Estimate.empty(count)
     workers = max(1, os.cpu_count() or 1)
-    running: deque[Future[tuple[int, int, Estimate]]] = deque()
+    long = np.zeros(count, dtype=bool)
+    running: deque[Future[_Block]] = deque()
+
+    def store(done: Future[_Block]) -> float:
+        start, end, part, part_long = done.result()
+        result.put(slice(start, end), part)
+        long[start:end] = part_long
+        return 0.06 + 0.84 * end / count
+
     with ThreadPoolExecutor(workers) as pool:
         for start, rings in _ring_blocks(near, radius):
             running.append(pool.submit(fit.block, start, rings))
             while len(running) > 2 * workers:
-                yield 0.06 + 0.94 * _store(result, running.popleft()) / count
+                yield store(running.popleft())
         while running:
-            yield 0.06 + 0.94 * _store(result, running.popleft()) / count
+            yield store(running.popleft())
+    if long.any():
+        # Over rings much longer than wide, a bend along them passes for one across.
+        turned = yield from portion(tensor_steps(mesh), 0.9, 1.0)
+        rows = np.flatnonzero(long & turned.good)
+        result.put(rows, Estimate(turned.k1[rows], turned.k2[rows], turned.good[rows]))
     return result
-
-
-def _store(result: Estimate, done: Future[tuple[int, int, Estimate]]) -> int:
-    start, end, part = done.result()
-    result.put(slice(start, end), part)
-    return end
 
 
 def _ring_blocks(near: Any, radius: int) -> Generator[tuple[int, Any], None, None]:
@@ -131,8 +142,8 @@ class _Fit:
 
     # Rings too small for their powers to be held come out as NaN, which `solve` takes for unsolved.
     @np.errstate(divide="ignore", invalid="ignore", over="ignore", under="ignore")
-    def block(self, start: int, rings: Any) -> tuple[int, int, Estimate]:
-        """Fit around the vertices from start on, a row of neighbours each; (start, end, result)."""
+    def block(self, start: int, rings: Any) -> _Block:
+        """Fit around the vertices from start on, a row of neighbours each."""
         end = start + rings.shape[0]
         pairs = _Pairs(rings, self.vertices, self.normals, self.columns, start)
         k1, k2, solved = self._curvatures(pairs, self.terms)
@@ -142,7 +153,7 @@ class _Fit:
             k1, k2 = np.where(solved, k1, other1), np.where(solved, k2, other2)
             solved |= other
         good = self.sound[start:end] & pairs.has_normal & solved & (pairs.count >= 5.0)
-        return start, end, Estimate(k1, k2, good)
+        return start, end, Estimate(k1, k2, good), pairs.long
 
     def _curvatures(
         self, pairs: _Pairs, terms: Sequence[Exponents]
@@ -224,7 +235,7 @@ class _Pairs:
         middle, half = (xx + yy) / 2.0, np.hypot((xx - yy) / 2.0, xy)
         off_centre = (self.moment(1, 0) / number) ** 2 + (self.moment(0, 1) / number) ** 2
         self.one_sided = off_centre > ONE_SIDED * 2.0 * middle
-        long = middle - half < ELONGATED * (middle + half)
+        self.long = long = middle - half < ELONGATED * (middle + half)
         if not long.any():
             self.wide = self.high = np.where(middle > 0.0, np.sqrt(middle), 1.0)
         else:
@@ -288,47 +299,6 @@ def _tangents(normal: Points) -> tuple[Points, Points]:
     return np.stack((1.0 + sign * x * x * a, sign * b, -sign * x)), np.stack(
         (b, sign + y * y * a, -y)
     )
-
-
-def solve(
-    matrix: list[list[Points]], right: list[Points], limit: float = PIVOT_LIMIT
-) -> tuple[list[Points], NDArray[np.bool_]]:
-    """Solve many small symmetric systems at once by Cholesky's method, L D L^T.
-
-    Args:
-        matrix: k x k arrays (n,); only the lower triangle is read.
-        right: k arrays (n,).
-        limit: See PIVOT_LIMIT.
-
-    Returns:
-        k arrays (n,), and where the system determines them.
-    """
-    size = len(right)
-    lower: list[list[Points]] = [[] for _ in range(size)]
-    pivots: list[Points] = []
-    found = list(right)
-    sound = np.ones(len(right[0]), dtype=bool)
-    for i in range(size):
-        scaled: list[Points] = []
-        for j in range(i):
-            entry = matrix[i][j]
-            for k in range(j):
-                entry = entry - scaled[k] * lower[j][k]
-            scaled.append(entry)
-        lower[i] = [entry / pivot for entry, pivot in zip(scaled, pivots, strict=True)]
-        pivot = matrix[i][i]
-        for entry, part in zip(scaled, lower[i], strict=True):
-            pivot = pivot - entry * part
-        enough = pivot > limit * matrix[i][i]
-        sound &= enough
-        pivots.append(np.where(enough, pivot, 1.0))
-        for j in range(i):
-            found[i] = found[i] - lower[i][j] * found[j]
-    found = [value / pivot for value, pivot in zip(found, pivots, strict=True)]
-    for i in reversed(range(size)):
-        for j in range(i + 1, size):
-            found[i] = found[i] - lower[j][i] * found[j]
-    return found, sound
 
 
 def _principal(d: Points, e: Points, a: Points, b: Points, c: Points) -> tuple[Points, Points]:

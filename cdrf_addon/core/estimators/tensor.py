@@ -15,7 +15,7 @@ import numpy as np
 
 from ..topology import cross, scatter
 from .estimate import Estimate
-from .polynomial import solve
+from .least_squares import solve
 
 if TYPE_CHECKING:
     from ..mesh import CleanMesh, Points
