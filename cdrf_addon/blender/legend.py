@@ -109,7 +109,7 @@ def add_to_picture(scene: bpy.types.Scene, path: Path) -> None:
     bpy.data.images.remove(image)
     picture = imbuf.load(str(path))
     blf.size(0, size)
-    with blf.bind_imbuf(0, picture):  # type: ignore[attr-defined]  # a stub without __enter__
+    with blf.bind_imbuf(0, picture):
         lines = [(left + 1.5 * wide, bottom + tall * y - 0.35 * size, text) for y, text in marks]
         lines.append((left, bottom + tall + 0.6 * size, title))
         for x, y, text in lines:
