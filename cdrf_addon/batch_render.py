@@ -383,6 +383,7 @@ def _render_all(
     key = job_key(path, options)
     suffix = ".exr" if options.format == "EXR" else ".png"
     sigmas: list[float | None] = list(dict.fromkeys(options.sigma0)) or [None]
+    curvature = options.output / f"{stem}_curvature.png"
     if options.frames:
         planned = [
             options.output / f"{stem}_{_label(sigma)}_{frame:04d}{suffix}"
@@ -390,7 +391,7 @@ def _render_all(
             for sigma in sigmas
         ]
         if options.curvature:
-            planned.append(options.output / f"{stem}_curvature.png")
+            planned.append(curvature)
         if all(_made(target, key, done) for target in planned) and not options.force:
             record.images = [_entry(target, key, 0.0, resumed=True) for target in planned]
             return
@@ -399,13 +400,12 @@ def _render_all(
     frames = options.frames or [scene.frame_current]
     own = {material.name: material.cdrf.sigma0 for material in translucent_materials()}
     if options.curvature:
-        target = options.output / f"{stem}_curvature.png"
-        if not options.force and _made(target, key, done):
-            record.images.append(_entry(target, key, 0.0, resumed=True))
+        if not options.force and _made(curvature, key, done):
+            record.images.append(_entry(curvature, key, 0.0, resumed=True))
         else:
             if sigmas[0] is not None:
                 _set_sigma0(dict.fromkeys(own, sigmas[0]))
-            _render_curvature(target, key, options, record)
+            _render_curvature(curvature, key, options, record)
     total = len(frames) * len(sigmas)
     for number, frame in enumerate(frames):
         scene.frame_set(frame)

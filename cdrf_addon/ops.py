@@ -247,6 +247,13 @@ class CDRF_OT_remove(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _some_translucent(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if not translucent_objects(context.view_layer):
+        cls.poll_message_set("Nothing is translucent yet: press Make Translucent first")
+        return False
+    return True
+
+
 class CDRF_OT_show_curvature(bpy.types.Operator):
     """Show the curvature in colours with a legend, or the skin again; green marks are filled in"""
 
@@ -275,10 +282,7 @@ class CDRF_OT_show_curvature(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if ids.DISPLAY_KEY in context.scene:
             return True  # whatever became of the objects since, it can be switched off
-        if not translucent_objects(context.view_layer):
-            cls.poll_message_set("Nothing is translucent yet: press Make Translucent first")
-            return False
-        return True
+        return _some_translucent(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         skins = skins_of(context.view_layer)
@@ -315,10 +319,7 @@ class CDRF_OT_save_curvature(bpy.types.Operator):
         if context.scene.camera is None:
             cls.poll_message_set("The scene has no camera; add one first")
             return False
-        if not translucent_objects(context.view_layer):
-            cls.poll_message_set("Nothing is translucent yet: press Make Translucent first")
-            return False
-        return True
+        return _some_translucent(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)

@@ -29,8 +29,6 @@ FILL_ROUNDS = 64
 # Curvature radii below this part of the median edge are noise of the fit, not shape.
 CURVATURE_LIMIT = 1e3
 
-Steps = Generator[float, None, "CurvatureField"]
-
 
 @dataclass(frozen=True)
 class Options:

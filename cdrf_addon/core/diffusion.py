@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .mesh import FLATNESS_LIMIT, edge_lengths, repeated_faces
 from .progress import with_progress
 from .topology import face_normals, scatter
 
@@ -231,15 +232,10 @@ def _distinct_triangles(vertices: Points, triangles: Indices) -> Indices:
     triangles = triangles[(a != b) & (b != c) & (c != a)].astype(np.int64)
     if not len(triangles):
         return triangles
-    count = len(vertices)
-    low, high = triangles.min(axis=1), triangles.max(axis=1)
-    middle = triangles.sum(axis=1) - low - high
-    _, first = np.unique((low * count + middle) * count + high, return_index=True)
-    triangles = triangles[first]
+    triangles = triangles[~repeated_faces(triangles, len(vertices))]
     _, doubled_area = face_normals(vertices, triangles)
-    corners = vertices[triangles]
-    size = ((corners - np.roll(corners, -1, axis=1)) ** 2).sum(axis=2).max(axis=1)
-    return triangles[doubled_area > 1e-6 * size]
+    longest = edge_lengths(vertices, triangles).max(axis=0)
+    return triangles[doubled_area > FLATNESS_LIMIT * longest**2]
 
 
 class Diffusion:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from .mesh import TriMesh, shared_edges, weld
-from .topology import face_normals
+from .topology import face_normals, runs_twice
 
 # Faces this close to one plane are one flat face; float32 positions of a plane lean less.
 FLAT_ANGLE = math.radians(1.0)
@@ -35,10 +35,8 @@ def is_faceted(mesh: TriMesh) -> bool:
         if not (doubled_area > 0.0).all() or not np.isfinite(doubled_area).all():
             return False
         unit = normal / doubled_area
-    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    directed = np.sort(tail * len(vertices) + head)
-    if (directed[1:] == directed[:-1]).any():
-        return False  # doubled or flipped faces: not for this quick look to judge
+    if runs_twice(triangles, len(vertices)):
+        return False  # not for this quick look to judge
     face, other, _, _ = shared_edges(triangles, len(vertices))
     for some in (slice(0, SAMPLE), slice(SAMPLE, None)):
         cosine = (unit[:, face[some]] * unit[:, other[some]]).sum(axis=0)

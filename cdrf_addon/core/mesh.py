@@ -17,7 +17,7 @@ import numpy as np
 
 from .errors import MeshError
 from .progress import run_steps
-from .topology import face_normals
+from .topology import edge_pairs, face_normals, half_edges, runs_twice
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -335,6 +335,14 @@ def _drop_unusable(
 
 
 def _drop_duplicates(triangles: Indices, count: int, report: CleaningReport) -> Indices:
+    repeated = repeated_faces(triangles, count)
+    report.duplicate_faces = int(repeated.sum())
+    return triangles[~repeated] if report.duplicate_faces else triangles
+
+
+def repeated_faces(triangles: Indices, count: int) -> NDArray[np.bool_]:
+    """Tell which faces lie on the same three of `count` vertices as an earlier one, (m,)."""
+    repeated = np.zeros(len(triangles), dtype=bool)
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     middle = triangles.sum(axis=1) - low - high
     if count < 2**21:
@@ -342,14 +350,12 @@ def _drop_duplicates(triangles: Indices, count: int, report: CleaningReport) -> 
         key = (low * count + middle) * count + high
         ranked = np.sort(key)
         if not (ranked[1:] == ranked[:-1]).any():
-            return triangles
+            return repeated
     order = np.lexsort((high, middle, low))
     ordered = np.stack((low, middle, high), axis=1)[order]
-    repeated = np.zeros(len(triangles), dtype=bool)
     # lexsort is stable, so the first of each run is the first in the mesh: it stays.
     repeated[order[1:]] = (ordered[1:] == ordered[:-1]).all(axis=1)
-    report.duplicate_faces = int(repeated.sum())
-    return triangles[~repeated]
+    return repeated
 
 
 def split_creases(vertices: Points, triangles: Indices, angle: float) -> tuple[Indices, Indices]:
@@ -398,13 +404,8 @@ def shared_edges(triangles: Indices, count: int) -> tuple[Indices, Indices, Indi
     Returns:
         The two faces of each, and the corner of each at which the edge starts.
     """
-    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    key = np.minimum(tail, head) * count + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    start = np.flatnonzero(np.concatenate(([True], key[1:] != key[:-1])))
-    pair = start[np.diff(np.append(start, len(key))) == 2]
-    one, other = order[pair], order[pair + 1]
+    tail, head = half_edges(triangles)
+    one, other = edge_pairs(triangles, count)
     wound = tail[one] == head[other]
     one, other = one[wound], other[wound]
     return one // 3, other // 3, one % 3, other % 3
@@ -423,22 +424,13 @@ def _orient(
     from scipy.sparse.csgraph import connected_components
 
     seam = np.zeros(vertex_count, dtype=bool)
-    tail = triangles.ravel()
-    head = np.roll(triangles, -1, axis=1).ravel()
-    directed = np.sort(tail * vertex_count + head)
-    if not (directed[1:] == directed[:-1]).any():
-        return triangles, seam  # no edge is run through twice in the same direction
+    if not runs_twice(triangles, vertex_count):
+        return triangles, seam
     count = len(triangles)
-    tail = triangles.ravel()
-    head = np.roll(triangles, -1, axis=1).ravel()
-    forward = tail < head
-    key = np.minimum(tail, head) * (int(triangles.max()) + 1) + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    key, forward, face = key[order], forward[order], order // 3
+    tail, head = half_edges(triangles)
     # Only edges of exactly two faces say anything about winding.
-    start = np.flatnonzero(np.concatenate(([True], key[1:] != key[:-1])))
-    pair = start[np.diff(np.append(start, len(key))) == 2]
-    one, other, alike = face[pair], face[pair + 1], forward[pair] == forward[pair + 1]
+    edge, twin = edge_pairs(triangles, vertex_count)
+    one, other, alike = edge // 3, twin // 3, tail[edge] == tail[twin]
     if not alike.any():
         return triangles, seam
 
@@ -455,7 +447,7 @@ def _orient(
     flip &= as_is != flipped
     report.flipped_faces = int(flip.sum())
     # Edges that are still alike after that have no consistent winding at all.
-    torn = order[pair][alike ^ flip[one] ^ flip[other]]
+    torn = edge[alike ^ flip[one] ^ flip[other]]
     seam[tail[torn]] = seam[head[torn]] = True
     return np.where(flip[:, None], triangles[:, ::-1], triangles), seam
 

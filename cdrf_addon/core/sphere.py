@@ -7,10 +7,15 @@ sphere; 1/r is exact, and one number serves the whole mesh.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .curvature import CurvatureField
 from .mesh import CleaningReport, TriMesh, edge_lengths
+
+if TYPE_CHECKING:
+    from .mesh import Points
 
 # A bump of height h over one edge e bends by about h / e^2; this much of 1/r is allowed.
 BUMP_TOLERANCE = 0.005
@@ -26,7 +31,7 @@ SAMPLE = 2_000
 def sphere_curvature(mesh: TriMesh) -> CurvatureField | None:
     """Return the exact curvature of a mesh whose vertices lie on one sphere, else None.
 
-    Parts of a sphere count. The sphere is fitted by least squares to |v|^2 = 2 c.v + (r^2 - |c|^2).
+    Parts of a sphere count.
     """
     if len(mesh.triangles) > 2 * SAMPLE and not _may_be_sphere(mesh):
         return None
@@ -40,13 +45,9 @@ def sphere_curvature(mesh: TriMesh) -> CurvatureField | None:
     if not extent > 1.0 / MOST_EXTENT:
         return None
     scaled = (points - middle) / extent
-    system = np.column_stack((2.0 * scaled, np.ones(len(scaled))))
-    solution, _, rank, singular = np.linalg.lstsq(system, (scaled**2).sum(axis=1), rcond=None)
-    # A nearly flat cap fits spheres of any radius.
-    if rank < 4 or singular[-1] < 1e-3 * singular[0]:
+    centre, radius, determined = _fit_sphere(scaled)
+    if not determined:
         return None
-    centre = solution[:3]
-    radius = float(np.sqrt(max(solution[3] + centre @ centre, 0.0)))
     corners = (mesh.vertices[mesh.triangles] - middle) / extent - centre
     edge = float(np.median(edge_lengths(mesh.vertices, mesh.triangles))) / extent
     tolerance = max(BUMP_TOLERANCE * edge**2 / radius, ROUNDING * radius)
@@ -72,9 +73,17 @@ def _may_be_sphere(mesh: TriMesh) -> bool:
     centred = points - points.mean(axis=0)
     extent = max(float(np.ptp(centred, axis=0).max()), 1.0 / MOST_EXTENT)
     scaled = centred / extent
-    system = np.column_stack((2.0 * scaled, np.ones(len(scaled))))
-    solution, *_ = np.linalg.lstsq(system, (scaled**2).sum(axis=1), rcond=None)
-    radius2 = max(solution[3] + solution[:3] @ solution[:3], 0.0)
-    off = np.abs(np.linalg.norm(scaled - solution[:3], axis=1) - np.sqrt(radius2))
+    centre, radius, _ = _fit_sphere(scaled)
+    off = np.abs(np.linalg.norm(scaled - centre, axis=1) - radius)
     # Looser than the test itself, as these faces may be larger than most.
-    return bool(off.max() <= 0.02 * np.sqrt(radius2))
+    return bool(off.max() <= 0.02 * radius)
+
+
+def _fit_sphere(points: Points) -> tuple[Points, float, bool]:
+    """Centre and radius by least squares to |v|^2 = 2 c.v + (r^2 - |c|^2), and if they are sure."""
+    system = np.column_stack((2.0 * points, np.ones(len(points))))
+    solution, _, rank, singular = np.linalg.lstsq(system, (points**2).sum(axis=1), rcond=None)
+    centre = solution[:3]
+    radius = float(np.sqrt(max(solution[3] + centre @ centre, 0.0)))
+    # A nearly flat cap fits spheres of any radius.
+    return centre, radius, bool(rank == 4 and singular[-1] >= 1e-3 * singular[0])

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
 # Below this, an averaged normal says nothing (opposite sheets cancel).
 NORMAL_LIMIT = 1e-3
-# A neighbourhood grows with the square of the valence, and so do time and memory.
-VALENCE_LIMIT = 256
 
 
 def adjacency(triangles: Indices, count: int) -> Any:
@@ -36,6 +34,29 @@ def adjacency(triangles: Indices, count: int) -> Any:
     tail = np.concatenate((*corners, *np.roll(corners, -1, axis=0), itself))
     head = np.concatenate((*np.roll(corners, -1, axis=0), *corners, itself))
     return csr_array((np.ones(len(tail), dtype=bool), (tail, head)), (count, count))
+
+
+def half_edges(triangles: Indices) -> tuple[Indices, Indices]:
+    """Start and end of the three edges of each face, (3m,) each; number 3f + c is face f's c-th."""
+    return triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+
+
+def runs_twice(triangles: Indices, count: int) -> bool:
+    """Tell whether an edge is run through twice in one direction: faces doubled or flipped."""
+    tail, head = half_edges(triangles)
+    directed = np.sort(tail * count + head)
+    return bool((directed[1:] == directed[:-1]).any())
+
+
+def edge_pairs(triangles: Indices, count: int) -> tuple[Indices, Indices]:
+    """The two half-edges of each edge of exactly two faces, however these are wound."""
+    tail, head = half_edges(triangles)
+    key = np.minimum(tail, head) * count + np.maximum(tail, head)
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    start = np.flatnonzero(np.concatenate(([True], key[1:] != key[:-1])))
+    pair = start[np.diff(np.append(start, len(key))) == 2]
+    return order[pair], order[pair + 1]
 
 
 def scatter(triangles: Indices, per_corner: Points, count: int) -> Points:
@@ -75,8 +96,3 @@ def vertex_normals(
     length = np.sqrt((total**2).sum(axis=1))
     sound = length > NORMAL_LIMIT * size
     return total / np.where(sound, length, 1.0)[:, None], size > 0.0, sound
-
-
-def hubs(triangles: Indices, count: int) -> NDArray[np.bool_]:
-    """Tell which vertices join too many faces to be fitted in reasonable time."""
-    return np.bincount(triangles.ravel(), minlength=count) > VALENCE_LIMIT

@@ -17,15 +17,12 @@ import argparse
 import itertools
 import json
 import math
-import os
-import platform
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +32,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 import bpy  # noqa: E402  (the checkout must be importable first)
 import igl  # noqa: E402
 import numpy as np  # noqa: E402
+from machine import machine  # noqa: E402
 from mathutils import Vector  # noqa: E402
 from mathutils.bvhtree import BVHTree  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
@@ -859,19 +857,6 @@ PARTS = {
 
 
 # --- the page ----------------------------------------------------------------------------------
-
-
-def machine() -> dict[str, str]:
-    """Name what the numbers were measured on."""
-    packages = {name: version(name) for name in ("numpy", "scipy", "libigl")}
-    return {
-        "date": time.strftime("%Y-%m-%d"),
-        "cores": str(os.cpu_count()),
-        "architecture": platform.machine(),
-        "python": platform.python_version(),
-        "blender": bpy.app.version_string,
-        **packages,
-    }
 
 
 def to_table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> list[str]:

@@ -13,13 +13,10 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-import os
-import platform
 import sys
 import time
 from collections.abc import Callable
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +26,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 import bpy  # noqa: E402  (the checkout must be importable first)
 import igl  # noqa: E402
 import numpy as np  # noqa: E402
+from machine import machine  # noqa: E402
 from rig import Rig, cdrf_node, diffuse_material  # noqa: E402
 from surfaces import ALL_SURFACES, Surface  # noqa: E402
 
@@ -260,19 +258,6 @@ BENCHES = {
     "setup": bench_setup,
     "frame": bench_frame,
 }
-
-
-def machine() -> dict[str, str]:
-    """Name what the numbers were measured on."""
-    packages = {name: version(name) for name in ("numpy", "scipy", "libigl")}
-    return {
-        "date": time.strftime("%Y-%m-%d"),
-        "cores": str(os.cpu_count()),
-        "architecture": platform.machine(),
-        "python": platform.python_version(),
-        "blender": bpy.app.version_string,
-        **packages,
-    }
 
 
 def to_markdown(results: dict[str, Any]) -> str:

@@ -11,7 +11,10 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..mesh import Points
+    from ..mesh import CleanMesh, Points
+
+# A neighbourhood grows with the square of the valence, and so do time and memory.
+VALENCE_LIMIT = 256
 
 
 @dataclass(frozen=True)
@@ -33,3 +36,13 @@ class Estimate:
     def put(self, rows: slice | NDArray[np.int64], part: Estimate) -> None:
         """Fill in some of the vertices."""
         self.k1[rows], self.k2[rows], self.good[rows] = part.k1, part.k2, part.good
+
+
+def fittable_faces(mesh: CleanMesh) -> NDArray[np.bool_]:
+    """Tell which faces a fit over rings may use, (m,), and count the hubs in the mesh's report.
+
+    Left out are the faces at vertices that join too many edges, and along a seam without a side.
+    """
+    hub = np.bincount(mesh.triangles.ravel(), minlength=len(mesh.vertices)) > VALENCE_LIMIT
+    mesh.report.hub_vertices = int(hub.sum())
+    return np.asarray(~(hub | mesh.seam)[mesh.triangles].any(axis=1))

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import DependencyError
-from ..topology import NORMAL_LIMIT, adjacency, face_normals, hubs, vertex_normals
-from .estimate import Estimate
+from ..topology import NORMAL_LIMIT, adjacency, face_normals, vertex_normals
+from .estimate import Estimate, fittable_faces
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -83,13 +83,8 @@ def _guard_steps(mesh: CleanMesh, radius: int) -> Generator[float, None, Indices
     libigl divides by the length of that normal; the NaN it gets crashes its SVD, or comes out as
     a silent zero. Dropped vertices are filled from their neighbours afterwards.
     """
-    triangles = mesh.triangles
+    triangles = mesh.triangles[fittable_faces(mesh)]
     count = len(mesh.vertices)
-    hub = hubs(triangles, count)
-    mesh.report.hub_vertices = int(hub.sum())
-    hub |= mesh.seam
-    if hub.any():
-        triangles = triangles[~hub[triangles].any(axis=1)]
     progress = 0.0
     for _ in range(GUARD_ROUNDS):
         unit, used, sound = vertex_normals(face_normals(mesh.vertices, triangles), triangles, count)

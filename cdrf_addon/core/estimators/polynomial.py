@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..progress import portion
-from ..topology import NORMAL_LIMIT, adjacency, hubs, vertex_normals
-from .estimate import Estimate
+from ..topology import NORMAL_LIMIT, adjacency, vertex_normals
+from .estimate import Estimate, fittable_faces
 from .least_squares import PIVOT_LIMIT, solve
 from .tensor import tensor_steps
 
@@ -71,12 +71,9 @@ def polynomial_steps(
         Principal curvatures per unit of the clean mesh.
     """
     count = len(mesh.vertices)
-    hub = hubs(mesh.triangles, count)
-    mesh.report.hub_vertices = int(hub.sum())
-    hub |= mesh.seam
     triangles, (normal, area) = mesh.triangles, mesh.face_normals
-    if hub.any():
-        kept = ~hub[triangles].any(axis=1)
+    kept = fittable_faces(mesh)
+    if not kept.all():
         triangles, normal, area = triangles[kept], normal[:, kept], area[kept]
     normals, used, sound = vertex_normals((normal, area), triangles, count)
     yield 0.03
