@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import ParameterError
+from .arguments import angle_and_width
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -59,20 +59,7 @@ def reflectance(theta: ArrayLike, sigma: ArrayLike) -> NDArray[np.float64]:
     Raises:
         ParameterError: theta is not finite, or sigma is negative or not a number.
     """
-    angle, width = np.broadcast_arrays(
-        np.asarray(theta, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
-    )
-    if not np.isfinite(angle).all():
-        raise ParameterError("The angle between normal and light must be a finite number.")
-    if np.isnan(width).any() or (width < 0.0).any():
-        raise ParameterError("The blur width sigma must be zero or positive, not negative or NaN.")
-    shape = angle.shape
-    angle = np.abs(angle.ravel())
-    # Folding rounds, so angles that need none are left to the last bit.
-    far = angle > math.pi
-    angle[far] = np.abs(np.remainder(angle[far] + math.pi, 2.0 * math.pi) - math.pi)
-    width = width.ravel()
-
+    angle, width, shape = angle_and_width(theta, sigma)
     result = np.maximum(np.cos(angle), 0.0)
     narrow = (width > 0.0) & (width < SERIES_FROM)
     wide = width >= SERIES_FROM
