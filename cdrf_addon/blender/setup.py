@@ -36,7 +36,7 @@ from ..core.summary import (
     CurvatureSummary,
     summarise,
 )
-from . import display, shader, state
+from . import display, reflectance_models, shader, state
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
 from .mesh_io import (
@@ -409,7 +409,8 @@ class Setup:
         settings = material.cdrf
         fresh = cdrf_node(material) is None
         ratio = tuple(settings.sigma0_ratio)
-        group = shader.ensure_shader_group(shader.variant_of(ratio, source), self.scene, lights)
+        wanted = shader.variant_of(ratio, source, reflectance_models.ensure_chosen(material))
+        group = shader.ensure_shader_group(wanted, self.scene, lights)
         node = install(material, group)
         work = self._work_of(material)
         if fresh:
@@ -494,18 +495,6 @@ def linked_skins(item: bpy.types.Object) -> list[bpy.types.Material]:
 def _present_source(material: bpy.types.Material) -> str:
     node = cdrf_node(material)
     return shader.stamped_variant(node.node_tree).source if node is not None else ""
-
-
-def scene_of_group(
-    group: bpy.types.ShaderNodeTree,
-) -> tuple[bpy.types.Scene, list[SceneLight]] | None:
-    """Return the scene a shader group was made for and its lights; the open one if it is gone."""
-    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
-    if scene is None:
-        return None
-    current = bpy.context.view_layer
-    layer = current if bpy.context.scene == scene else scene.view_layers[0]
-    return scene, scene_lights(scene, layer)
 
 
 def remove_unused_groups() -> None:

@@ -32,8 +32,9 @@ from surfaces import ALL_SURFACES, Surface  # noqa: E402
 
 from cdrf_addon import register, unregister  # noqa: E402
 from cdrf_addon.compat import ensure_node_tree  # noqa: E402
+from cdrf_addon.core.heat_kernel import sphere_reflectance  # noqa: E402
 from cdrf_addon.core.lut import LutLayout, build_lut, sample_lut  # noqa: E402
-from cdrf_addon.core.reflectance import reflectance  # noqa: E402
+from cdrf_addon.core.models import sphere  # noqa: E402
 
 SEED = 20111106
 DRAWS = 15
@@ -58,12 +59,12 @@ def bench_lut() -> tuple[str, list[str], Rows]:
     near = np.sign(rng.uniform(-1, 1, count)) * 10 ** rng.uniform(-7, 0, count)
     cosine = np.concatenate((rng.uniform(-1, 1, count), near))
     sigma = np.concatenate((10 ** rng.uniform(-4, 1.5, count), rng.uniform(0, 3, count)))
-    exact = reflectance(np.arccos(cosine), sigma)
+    exact = sphere_reflectance(np.arccos(cosine), sigma)
     rows: Rows = []
     for width, height in ((64, 32), (128, 64), (256, 128), (512, 256), (1024, 512)):
         layout = LutLayout(width, height)
-        table = build_lut(layout)
-        spent = seconds_of(partial(build_lut, layout))
+        table = build_lut(sphere(), layout)
+        spent = seconds_of(partial(build_lut, sphere(), layout))
         for storage in ("float", "half"):
             stored = table if storage == "float" else table.astype(np.float16).astype(np.float32)
             error = np.abs(sample_lut(stored, cosine, sigma**2, layout) - exact)

@@ -16,6 +16,7 @@ from cdrf_addon.core.lut import (
     sample_lut,
     sigma_axis,
 )
+from cdrf_addon.core.models import ring
 from cdrf_addon.core.reflectance import reflectance
 
 pytestmark = pytest.mark.smoke
@@ -38,7 +39,7 @@ LAYOUTS = [DEFAULT_LAYOUT, LutLayout(512, 64), LutLayout(97, 33), LutLayout(12, 
 
 @pytest.fixture(scope="module")
 def table() -> np.ndarray:
-    return build_lut()
+    return build_lut(ring())
 
 
 def test_the_table_is_whole(table: np.ndarray) -> None:
@@ -71,7 +72,7 @@ def test_the_ends_of_both_axes_are_texel_centres(layout: LutLayout) -> None:
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=str)
 def test_the_ends_are_exact_to_float32(layout: LutLayout) -> None:
-    built = build_lut(layout)
+    built = build_lut(ring(), layout)
     sigma = sigma_axis(layout)
     for cosine, theta in ((1.0, 0.0), (-1.0, math.pi)):
         got = sample_lut(built, np.full(layout.height, cosine), sigma**2, layout)
