@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import bpy
 
 from .. import ids
-from ..core.errors import SceneError
+from ..core.errors import ParameterError, SceneError
 from ..core.models import (
     DEFAULT_KIND,
     MEASURED,
@@ -26,10 +26,12 @@ from ..core.models import (
     ring,
     sphere,
 )
+from ..core.scattering import sigma0_per_radius
 from . import shader
 from .image import ensure_table, find_table, table_of
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
+from .read_material import Scattering
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -53,6 +55,15 @@ def model_of_kind(material: bpy.types.Material, kind: str) -> Model | None:
     if kind == PROFILE:
         return profile(parse_profile(settings.profile, settings.profile_base))
     return ring() if kind == RING else sphere()
+
+
+def profile_problem(material: bpy.types.Material) -> str:
+    """Say what is wrong with the text of a material's profile; empty if nothing is."""
+    try:
+        parse_profile(material.cdrf.profile)
+    except ParameterError as error:
+        return str(error)
+    return ""
 
 
 def set_kind(material: bpy.types.Material, kind: str) -> None:
@@ -91,6 +102,20 @@ def set_model(material: bpy.types.Material, key: str) -> None:
         ratio = tuple(r * math.sqrt(m) for r, m in zip(ratio, before.moments, strict=True))
     change_variant(material, ratio, key)
     settings.sigma0_ratio = ratio
+
+
+def has_colour(material: bpy.types.Material) -> bool:
+    """Tell whether the material's model has a table of its own for each channel."""
+    return table_of(ensure_chosen(material)).colour
+
+
+def set_scattering(material: bpy.types.Material, found: Scattering) -> None:
+    """Take the scatter distances from what a Principled or Subsurface node says."""
+    factors = sigma0_per_radius(found.albedo, found.method)
+    sigma0 = [radius * float(factor) for radius, factor in zip(found.radius, factors, strict=True)]
+    largest = max(sigma0)
+    material.cdrf.sigma0 = largest
+    material.cdrf.sigma0_ratio = [value / largest for value in sigma0]
 
 
 def ensure_chosen(material: bpy.types.Material) -> str:

@@ -32,6 +32,30 @@ if TYPE_CHECKING:
 
 RING, SPHERE, PROFILE, MEASURED = "RING", "SPHERE", "PROFILE", "MEASURED"
 DEFAULT_KIND = SPHERE
+MODEL_ITEMS = (
+    (
+        SPHERE,
+        "Sphere",
+        "Light spreads as heat does on a sphere, and none is lost. Closest to path tracing on "
+        "heads and figures; the default",
+    ),
+    (
+        RING,
+        "Ring (Kubo 2011)",
+        "The paper's own: light spreads along a circle. Bleeds more; brighter at large distances",
+    ),
+    (
+        PROFILE,
+        "Profile",
+        "A sum of Gaussians for each colour, as of layered skin. One look-up for all colours",
+    ),
+    (
+        MEASURED,
+        "Measured",
+        "What Cycles shows on spheres of this very material. Press Measure first",
+    ),
+)
+"""Kind, name and tooltip of each model."""
 MOST_GAUSSIANS = 64
 # The channels' weights may miss 1 by this much before they are taken for a mistake.
 WEIGHT_TOLERANCE = 0.02
