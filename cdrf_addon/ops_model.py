@@ -12,7 +12,7 @@ from .blender.materials import active_skin, cdrf_node
 from .blender.read_material import read_scattering
 from .core.errors import CdrfError
 from .core.models import DEFAULT_KIND, MODEL_ITEMS
-from .core.presets import PRESETS, in_units
+from .core.presets import PRESETS
 
 # Blurs of the middle of an object that look like none at all, and like wax throughout.
 OPAQUE, MOLTEN = 0.02, 1.5
@@ -93,41 +93,29 @@ class CDRF_OT_preset(_OnSkin):
         if self.real_height > 0.0:
             dimensions = context.object.dimensions
             size = (dimensions.z or max(dimensions)) / self.real_height
-        units = context.scene.unit_settings
-        metres = 1.0 if units.system == "NONE" else units.scale_length
-        sigma0, ratio = in_units(preset.sigma0, metres, size)
+        metres = reflectance_models.metres_of(context.scene)
         try:
-            reflectance_models.set_kind(skin, preset.model)
+            reflectance_models.apply_preset(skin, preset, metres, size)
         except CdrfError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        skin.cdrf.sigma0 = sigma0
-        skin.cdrf.sigma0_ratio = (1.0, 1.0, 1.0) if preset.model != DEFAULT_KIND else ratio
         node = cdrf_node(skin)
         assert node is not None
         if self.with_color and not node.inputs[ids.BASE_COLOR].is_linked:
             node.inputs[ids.BASE_COLOR].default_value = (*preset.albedo, 1.0)
-        blur = sigma0 * context.object.data.cdrf.median
-        if not self.real_height and 0.0 < blur < OPAQUE:
-            height = bpy.utils.units.to_string(
-                units.system if units.system != "NONE" else "METRIC",
-                "LENGTH",
-                context.object.dimensions.z * metres,
-                precision=3,
-            )
-            self.report(
-                {"WARNING"},
-                f"At {height} tall this object looks opaque in {preset.label.lower()}: give its "
-                "Real Height in the panel below the viewport (F9).",
-            )
-        elif blur > MOLTEN:
-            self.report(
-                {"WARNING"},
-                "The object is so small that light passes right through it: give its Real Height "
-                "in the panel below the viewport (F9).",
-            )
+        self._warn_of_size(context.object, skin.cdrf.sigma0, metres)
         self.report({"INFO"}, f"CDRF: {preset.label}. {preset.description}")
         return {"FINISHED"}
+
+    def _warn_of_size(self, item: bpy.types.Object, sigma0: float, metres: float) -> None:
+        """Say so where the object is so large or small that the material does not show."""
+        blur = sigma0 * item.data.cdrf.median
+        tall = bpy.utils.units.to_string("METRIC", "LENGTH", item.dimensions.z * metres)
+        advice = "give its Real Height in the panel below the viewport (F9)."
+        if 0.0 < blur < OPAQUE:
+            self.report({"WARNING"}, f"At {tall} tall this object looks opaque: {advice}")
+        elif blur > MOLTEN:
+            self.report({"WARNING"}, f"At {tall} tall light passes right through: {advice}")
 
 
 class CDRF_OT_read_shader(_OnSkin):

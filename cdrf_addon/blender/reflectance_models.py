@@ -26,6 +26,7 @@ from ..core.models import (
     ring,
     sphere,
 )
+from ..core.presets import Preset, in_units
 from ..core.scattering import sigma0_per_radius
 from . import shader
 from .image import ensure_table, find_table, table_of
@@ -116,6 +117,31 @@ def set_scattering(material: bpy.types.Material, found: Scattering) -> None:
     largest = max(sigma0)
     material.cdrf.sigma0 = largest
     material.cdrf.sigma0_ratio = [value / largest for value in sigma0]
+
+
+def metres_of(scene: bpy.types.Scene) -> float:
+    """Metres in a unit of the scene; 1 where it has no units, as elsewhere in Blender."""
+    units = scene.unit_settings
+    return 1.0 if units.system == "NONE" else float(units.scale_length)
+
+
+def apply_preset(material: bpy.types.Material, preset: Preset, metres: float, size: float) -> None:
+    """Give a material the model and scatter distances of a preset.
+
+    Args:
+        material: Any editable material.
+        preset: In millimetres.
+        metres: In a unit of the scene.
+        size: Size of the object in the scene over its real size.
+
+    Raises:
+        SceneError: The material is linked.
+    """
+    sigma0, ratio = in_units(preset.sigma0, metres, size)
+    set_kind(material, preset.model)
+    material.cdrf.sigma0 = sigma0
+    # A profile has its channels' widths in its table.
+    material.cdrf.sigma0_ratio = (1.0, 1.0, 1.0) if preset.model == PROFILE else ratio
 
 
 def ensure_chosen(material: bpy.types.Material) -> str:
