@@ -142,7 +142,7 @@ class Profile:
     def to_text(self) -> str:
         """One line a Gaussian: width, then red, green and blue."""
         return "; ".join(
-            f"{width:.12g} " + " ".join(f"{part:.12g}" for part in parts)
+            f"{width:.7g} " + " ".join(f"{part:.7g}" for part in parts)
             for width, parts in zip(self.widths, self.weights, strict=True)
         )
 
