@@ -28,6 +28,8 @@ from .reflectance import reflectance
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from .measurement import SphereMeasurement
+
     Evaluate = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
 RING, SPHERE, PROFILE, MEASURED = "RING", "SPHERE", "PROFILE", "MEASURED"
@@ -208,6 +210,31 @@ def profile(shape: Profile = SKIN_PROFILE) -> Model:
     key = f"{PROFILE} {_hash(shape.base, shape.widths, shape.weights)}"
     red, green, blue = (float(moment) for moment in moments)
     return Model(PROFILE, key, evaluate, True, (red, green, blue))
+
+
+def measured_model(
+    spheres: SphereMeasurement, radius: tuple[float, float, float]
+) -> tuple[Model, float]:
+    """What was measured on path-traced spheres, for channels of these scatter radii.
+
+    Returns:
+        The model, and the sigma0 that belongs to it, in the unit of the radii.
+    """
+    from .material_fit import sigma_per_scale
+    from .measured import MeasuredModel
+
+    slopes = [sigma_per_scale(spheres, channel) for channel in range(3)]
+    widest = int(np.argmax(radius))
+    table = MeasuredModel(spheres, radius, slopes[widest])
+    red, green, blue = (
+        float(ratio * slope / slopes[widest]) ** 2
+        for ratio, slope in zip(table.ratio, slopes, strict=True)
+    )
+    facts = [spheres.blender, spheres.method, spheres.seed, spheres.samples]
+    numbers = [float(number) for number in (*spheres.albedo, *table.ratio)]
+    key = f"{MEASURED} {_hash(facts, numbers)}"
+    model = Model(MEASURED, key, table.evaluate, True, (red, green, blue))
+    return model, max(radius) * slopes[widest]
 
 
 def _hash(*parts: str | Sequence[object]) -> str:

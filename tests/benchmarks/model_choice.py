@@ -45,7 +45,7 @@ from cdrf_addon.core.models import Model, ring, sphere  # noqa: E402
 from cdrf_addon.core.progress import run_steps  # noqa: E402
 from cdrf_addon.core.scale_space import LENGTH_PER_SIGMA0, KappaLevels, level_steps  # noqa: E402
 from cdrf_addon.core.scattering import sigma0_per_radius  # noqa: E402
-from cdrf_addon.measure import MeasureRequest, measure_steps  # noqa: E402
+from cdrf_addon.measure import Request, measure  # noqa: E402
 
 SHAPES = {
     "head": ROOT / "tests" / "data" / "human_head.obj",
@@ -86,7 +86,8 @@ class Pixels:
 
     def kappa(self, length: float) -> Array:
         """Curvature at a diffusion length, interpolated to the pixels."""
-        return np.maximum(self.case.hits.interpolate(self.shape, self.levels.at(length)), 0.0)
+        values = self.levels.at(length)[:, None]
+        return np.maximum(self.case.hits.interpolate(self.shape, values)[:, 0], 0.0)
 
     def error(self, contender: Contender, slider: float) -> float:
         """RMSE, mean over R, G, B."""
@@ -102,10 +103,10 @@ def levels_of(shape: Shape) -> KappaLevels:
 
 def contenders() -> list[Contender]:
     """Every model that can stand for the material of the references."""
-    request = MeasureRequest(albedo=(ALBEDO,) * 3, seed=SEED)
+    request = Request(albedo=(ALBEDO,) * 3, seed=SEED)
     with tempfile.TemporaryDirectory() as folder:
-        measured = MeasuredModel(run_steps(measure_steps(request, Path(folder))), RATIO)
-    slopes = {name: float(sigma0_per_radius(ALBEDO, model=name)) for name in ("RING", "SPHERE")}
+        measured = MeasuredModel(measure(request, Path(folder)), RATIO)
+    slopes = {name: float(sigma0_per_radius(ALBEDO)) for name in ("RING", "SPHERE")}
     table = Model("MEASURED", "MEASURED", measured.evaluate, colour=True)
     return [
         Contender("ring (the paper's), 3 look-ups", ring(), RATIO, slopes["RING"]),
