@@ -15,7 +15,8 @@ import numpy as np
 from .. import ids
 from ..core.curvature import Options
 from ..core.errors import MeshError
-from ..core.mesh import TriMesh, edge_lengths
+from ..core.mesh import TriMesh
+from ..core.topology import edge_lengths
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -17,7 +17,7 @@ import numpy as np
 
 from .errors import MeshError
 from .progress import run_steps
-from .topology import edge_pairs, face_normals, half_edges, runs_twice
+from .topology import edge_lengths, edge_pairs, face_normals, half_edges, runs_twice
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -273,18 +273,6 @@ def _drop_non_finite(
             "that move the vertices."
         )
     return mesh.vertices[finite], (np.cumsum(finite) - 1)[triangles]
-
-
-def edge_lengths(vertices: Points, triangles: Indices) -> Points:
-    """Length of the three edges of each triangle, shape (3, m)."""
-    x, y, z = np.ascontiguousarray(vertices.T)
-    square = np.empty((3, len(triangles)))
-    for side in range(3):
-        tail, head = triangles[:, side], triangles[:, (side + 1) % 3]
-        square[side] = (
-            (x[tail] - x[head]) ** 2 + (y[tail] - y[head]) ** 2 + (z[tail] - z[head]) ** 2
-        )
-    return np.sqrt(square)
 
 
 def _normalise(vertices: Points, triangles: Indices) -> tuple[Points, float, Points]:

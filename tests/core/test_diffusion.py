@@ -45,8 +45,9 @@ def ball(level: int, stretch: float = 1.0) -> tuple[CleanMesh, np.ndarray]:
 
 
 def step(mesh: CleanMesh, values: np.ndarray, *lengths: float) -> list[np.ndarray]:
+    diffusion = Diffusion(mesh)
     inside = [np.full(len(values), length / mesh.edge) for length in lengths]
-    return run_steps(Diffusion(mesh).steps(values, inside))
+    return [run_steps(diffusion.steps([values], length))[0] for length in inside]
 
 
 @pytest.mark.smoke
