@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .mesh import Indices, Points
+
+    Columns: TypeAlias = "Points | Sequence[Points]"
 
 # Below this, an averaged normal says nothing (opposite sheets cancel).
 NORMAL_LIMIT = 1e-3
@@ -109,9 +111,7 @@ def half_cotangents(vertices: Points, triangles: Indices) -> Points:
     return half
 
 
-def _edge_parts(
-    vertices: Points, triangles: Indices
-) -> Iterator[tuple[slice, list[Sequence[Points]]]]:
+def _edge_parts(vertices: Points, triangles: Indices) -> Iterator[tuple[slice, list[list[Points]]]]:
     """Go through the triangles part by part, with the edge opposite each corner, run in turn."""
     axes = columns(vertices)
     for part in parts(len(triangles)):
@@ -129,14 +129,14 @@ def _edge_parts(
         )
 
 
-def dot(one: Sequence[Points], other: Sequence[Points]) -> Points:
+def dot(one: Columns, other: Columns) -> Points:
     """Dot product of vectors as columns, (3, m)."""
     x, y, z = one
     u, v, w = other
     return x * u + y * v + z * w
 
 
-def cross(one: Sequence[Points], other: Sequence[Points]) -> Points:
+def cross(one: Columns, other: Columns) -> Points:
     """Cross product of vectors as columns, (3, m); several times as fast as numpy's."""
     x, y, z = one
     u, v, w = other
