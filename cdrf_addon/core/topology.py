@@ -58,9 +58,14 @@ def half_edges(triangles: Indices) -> tuple[Indices, Indices]:
 
 def runs_twice(triangles: Indices, count: int) -> bool:
     """Tell whether an edge is run through twice in one direction: faces doubled or flipped."""
-    tail, head = half_edges(triangles)
-    directed = np.sort(tail * count + head)
-    return bool((directed[1:] == directed[:-1]).any())
+    a, b, c = columns(triangles)
+    return has_repeats(np.concatenate((a * count + b, b * count + c, c * count + a)))
+
+
+def has_repeats(numbers: NDArray[Any]) -> bool:
+    """Tell whether a number occurs twice; sorting is several times as fast as `np.unique`."""
+    ranked = np.sort(numbers)
+    return bool((ranked[1:] == ranked[:-1]).any())
 
 
 def edge_pairs(triangles: Indices, count: int) -> tuple[Indices, Indices]:
