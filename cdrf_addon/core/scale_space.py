@@ -59,6 +59,7 @@ def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels
     """
     mesh = curvature.mesh
     diffusion = Diffusion(mesh)
+    yield 0.0
     finest = diffusion.size() / LEVEL_RATIO**LEVELS
     k1, k2 = curvature.k1, curvature.k2
     mean, gaussian = yield from portion(

@@ -41,14 +41,13 @@ def adjacency(triangles: Indices, count: int) -> Any:
     Returns:
         A scipy sparse array (count, count) of bool; products of it are rings of neighbours.
     """
-    from scipy.sparse import csr_array
+    from scipy.sparse import csr_array, eye_array
 
-    index = np.int32 if max(count, 6 * len(triangles) + count) < 2**31 else np.int64
-    corners = triangles.T.astype(index)
-    itself = np.arange(count, dtype=index)
-    tail = np.concatenate((*corners, *np.roll(corners, -1, axis=0), itself))
-    head = np.concatenate((*np.roll(corners, -1, axis=0), *corners, itself))
-    return csr_array((np.ones(len(tail), dtype=bool), (tail, head)), (count, count))
+    index = np.int32 if max(count, 3 * len(triangles)) < 2**31 else np.int64
+    corners = columns(triangles).astype(index)
+    ends = corners.ravel(), np.roll(corners, -1, axis=0).ravel()
+    one_way = csr_array((np.ones(triangles.size, dtype=bool), ends), (count, count))
+    return csr_array(one_way + one_way.T + eye_array(count, dtype=bool))
 
 
 def half_edges(triangles: Indices) -> tuple[Indices, Indices]:
@@ -138,7 +137,10 @@ def dot(one: Columns, other: Columns) -> Points:
     """Dot product of vectors as columns, (3, m)."""
     x, y, z = one
     u, v, w = other
-    return x * u + y * v + z * w
+    total = x * u
+    total += y * v
+    total += z * w
+    return total
 
 
 def cross(one: Columns, other: Columns) -> Points:
@@ -159,8 +161,8 @@ def vertex_normals(
         count: Number of vertices n.
     """
     normal, area = faces
-    total = np.stack([scatter(triangles, part, count) for part in normal], axis=1)
+    total = np.stack([scatter(triangles, part, count) for part in normal])
     size = scatter(triangles, area, count)
-    length = np.sqrt((total**2).sum(axis=1))
+    length = np.sqrt(dot(total, total))
     sound = length > NORMAL_LIMIT * size
-    return total / np.where(sound, length, 1.0)[:, None], size > 0.0, sound
+    return columns(total / np.where(sound, length, 1.0)), size > 0.0, sound

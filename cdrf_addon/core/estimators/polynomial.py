@@ -122,7 +122,7 @@ def _ring_blocks(near: Any, radius: int) -> Generator[tuple[Indices, Indices], N
         rings = near[first : first + RINGS_AT_ONCE]
         for _ in range(radius - 1):
             rings = rings @ near
-        sizes = np.diff(rings.indptr)
+        sizes, indices = np.diff(rings.indptr), rings.indices.astype(np.int64)
         order = np.argsort(-sizes, kind="stable")
         start = 0
         while start < len(order):
@@ -133,9 +133,8 @@ def _ring_blocks(near: Any, radius: int) -> Generator[tuple[Indices, Indices], N
                 # Twice, as numpy adds up a single column in another order.
                 chosen = np.repeat(chosen, 2)
             row = np.arange(most)[:, None]
-            # The last row of the matrix may end before the padding does.
-            place = np.minimum(rings.indptr[chosen] + row, rings.nnz - 1)
-            neighbours = rings.indices[place].astype(np.int64)
+            # Padding may reach beyond the last neighbour.
+            neighbours = np.take(indices, rings.indptr[chosen] + row, mode="clip")
             if sizes[chosen[-1]] < most:
                 neighbours[row >= sizes[chosen]] = -1
             yield first + chosen, neighbours
@@ -172,15 +171,14 @@ class _Fit:
     ) -> tuple[Points, Points, NDArray[np.bool_]]:
         limit = CUBIC_PIVOT_LIMIT if len(terms) > len(QUADRIC) else PIVOT_LIMIT
         solution, solved = solve(*self._equations(pairs, terms), limit)
-        of = {
-            (p, q): value / (pairs.wide**p * pairs.high**q)
-            for (p, q), value in zip(terms, solution, strict=True)
-        }
+        of = dict(zip(terms, solution, strict=True))
+        wide, high = pairs.wide, pairs.high
         flat = np.zeros(len(solved))
-        slope = of.get((1, 0), flat), of.get((0, 1), flat)
+        slope = of.get((1, 0), flat) / wide, of.get((0, 1), flat) / high
+        bend = of[2, 0] / wide**2, of[1, 1] / (wide * high), of[0, 2] / high**2
         if len(terms) > len(QUADRIC):
             solved &= ~pairs.one_sided
-        return *_principal(*slope, *(of[term] for term in ((2, 0), (1, 1), (0, 2)))), solved
+        return *_principal(*slope, *bend), solved
 
     def _equations(
         self, pairs: _Pairs, terms: Sequence[Exponents]
