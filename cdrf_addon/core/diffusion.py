@@ -325,6 +325,7 @@ class Diffusion:
             standing[coarse.patch] = self._standing
             self._standing = standing
             self._coarser.append(coarse)
+            yield 0.2
         solving = level.solve_steps(
             [self._restrict(values) for values in fields],
             length[self._standing],

@@ -172,9 +172,9 @@ def clean_steps(mesh: TriMesh, crease_angle: float = NO_CREASE) -> Generator[Non
     finite = np.isfinite(columns(mesh.vertices)).all(axis=0)
     vertices, triangles = _drop_non_finite(mesh, finite, report)
     yield
-    vertices, edge, lengths = _normalise(vertices, triangles)
+    vertices, edge, longest = _normalise(vertices, triangles)
     yield
-    triangles = _drop_unusable(vertices, triangles, lengths, report)
+    triangles = _drop_unusable(vertices, triangles, longest, report)
     yield
     welded, first = weld(vertices)
     report.welded_vertices = int(len(vertices) - len(first))
@@ -294,16 +294,16 @@ def _normalise(vertices: Points, triangles: Indices) -> tuple[Points, float, Poi
     """Centre the vertices and divide them by their median edge.
 
     Returns:
-        The vertices, the median edge, and the new lengths of all edges, (3, m).
+        The vertices, the median edge, and the new length of each face's longest edge, (m,).
     """
     # Two steps, so that neither 1e300 nor 1e-300 overflows a square on the way.
     axes, used = columns(vertices), _used(vertices, triangles)
-    middle = np.median(axes if used.all() else axes[:, used], axis=1)
-    centred = axes * 0.5 - middle[:, None] * 0.5
+    middle = [np.median(axis[used], overwrite_input=True) for axis in axes]
+    centred = axes * 0.5 - np.stack(middle)[:, None] * 0.5
     reach = np.abs(centred).max(axis=0)
     a, b, c = columns(triangles)
     of_face = np.maximum(np.maximum(reach[a], reach[b]), reach[c])
-    extent = float(np.median(of_face))
+    extent = float(np.median(of_face, overwrite_input=True))
     if not extent > 0.0:
         extent = float(of_face.max())
     if not extent > 0.0:
@@ -314,14 +314,14 @@ def _normalise(vertices: Points, triangles: Indices) -> tuple[Points, float, Poi
     positive = lengths[lengths > 0.0]
     if not len(positive):
         raise MeshError("All faces shrink to points; check the scale of the object.")
-    median = float(np.median(positive))
+    median = float(np.median(positive, overwrite_input=True))
     edge = median * extent * 2.0
     if not (np.isfinite(edge) and edge > np.finfo(np.float64).tiny):
         raise MeshError(
             f"Edges of {edge:.3g} units are outside what numbers can hold; "
             "check the scale of the object."
         )
-    return scaled / median, edge, lengths / median
+    return scaled / median, edge, lengths.max(axis=0) / median
 
 
 def _used(vertices: Points, triangles: Indices) -> NDArray[np.bool_]:
@@ -332,10 +332,9 @@ def _used(vertices: Points, triangles: Indices) -> NDArray[np.bool_]:
 
 
 def _drop_unusable(
-    vertices: Points, triangles: Indices, lengths: Points, report: CleaningReport
+    vertices: Points, triangles: Indices, longest: Points, report: CleaningReport
 ) -> Indices:
     """Drop faces that reach a vertex far away, and those without area."""
-    longest = lengths.max(axis=0)
     stray = longest > EDGE_LIMIT
     report.stray_faces = int(stray.sum())
     if stray.any():  # first, as their areas may be more than numbers can hold

@@ -47,9 +47,9 @@ GOLDFEATHER: tuple[Exponents, ...] = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1
 
 # Pairs of a vertex and a neighbour in a block: their arrays just fit into a core's cache.
 BLOCK_PAIRS = 60_000
-# Vertices of which the rings are made at once, as every product of sparse matrices costs a pass
-# over all columns.
-RINGS_AT_ONCE = 50_000
+# Rings are made for so many blocks at once, as every product of sparse matrices costs a pass over
+# all columns.
+BLOCKS_AT_ONCE = 16
 # A cubic that is hardly determined swings wildly; there the quadric takes over.
 CUBIC_PIVOT_LIMIT = 1e-3
 # Squared distance of the rings' centre from the vertex, in units of their squared extent, above
@@ -118,8 +118,11 @@ def _ring_blocks(near: Any, radius: int) -> Generator[tuple[Indices, Indices], N
     Those with the most neighbours come first; where others in the block have fewer, -1 follows.
     """
     count = near.shape[0]
-    for first in range(0, count, RINGS_AT_ONCE):
-        rings = near[first : first + RINGS_AT_ONCE]
+    # Rings grow with the square of the radius: 7, 19, 37, 61 points on a regular mesh.
+    per_vertex = max(1, round(near.nnz / count * (1 + radius) * radius / 2))
+    size = BLOCKS_AT_ONCE * max(64, BLOCK_PAIRS // per_vertex)
+    for first in range(0, count, size):
+        rings = near[first : first + size]
         for _ in range(radius - 1):
             rings = rings @ near
         sizes, indices = np.diff(rings.indptr), rings.indices.astype(np.int64)
