@@ -49,7 +49,7 @@ class Quality:
 
 QUALITIES = {
     "preview": Quality((64, 12), 8, 4),
-    "default": Quality((80, 20), 16, 8),
+    "default": Quality((80, 20), 24, 8),
     "fine": Quality((96, 24), 64, 8),
 }
 DEFAULT_QUALITY = "default"

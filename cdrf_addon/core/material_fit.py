@@ -97,9 +97,10 @@ def proportional(scales: Array, sigma: Array) -> tuple[float, float]:
         )
     # The median of the ratios: one noisy sphere does not move it.
     slope = float(np.median(sigma[used] / scales[used]))
-    off = np.abs(sigma / (slope * scales) - 1.0) > PROPORTIONAL_WITHIN
-    after = np.flatnonzero(off & (sigma > PROPORTIONAL_FROM) & (scales > scales[used][0]))
-    return slope, float(scales[max(after[0] - 1, 0)]) if len(after) else np.inf
+    # The last that still is proportional: before it noise may put one off, after it saturation all.
+    held = np.flatnonzero(np.abs(sigma / (slope * scales) - 1.0) <= PROPORTIONAL_WITHIN)
+    last = int(held[-1])
+    return slope, np.inf if last == len(scales) - 1 else float(scales[last])
 
 
 def sigma_per_scale(measurement: SphereMeasurement, channel: int) -> float:

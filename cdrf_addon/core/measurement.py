@@ -98,8 +98,14 @@ def solid_angle_weights(theta: Array) -> Array:
 
 
 def equator_weights(theta: Array) -> Array:
-    """Weights (B,) with sum 1 of bins at descending angles, uniform in theta, as in the paper."""
-    return np.asarray(-np.diff(_edges(theta)) / math.pi)
+    """Weights (B,) with sum 1 of bins at descending angles, uniform in theta, as in the paper.
+
+    The bins next to the poles count as wide as their neighbours are, not as far as to the poles.
+    """
+    edges = _edges(theta)
+    edges[0] = min(math.pi, 2.0 * theta[0] - edges[1])
+    edges[-1] = max(0.0, 2.0 * theta[-1] - edges[-2])
+    return np.asarray(-np.diff(edges) / (edges[0] - edges[-1]))
 
 
 def _edges(theta: Array) -> Array:

@@ -5,6 +5,11 @@ The curve is split into the best closed-form model, which has the sharp terminat
 scatter distance, and a remainder. The remainder becomes a penalised spline (Eilers and Marx 1996),
 as stiff as the discrepancy principle (Morozov 1966) lets it be: chi-squared per degree of freedom
 reaches 1. Its knots are close together where the shading ends, about the width of the blur.
+
+Of the closed-form model two multiples are free of the penalty: itself, and itself times sin theta.
+Cycles' walk enters the surface half by refraction, so that low albedos look brighter at grazing
+angles, and sin theta is, up to a factor, how squarely the pixels of one N.L are seen on average
+when the light comes from the side.
 """
 
 from __future__ import annotations
@@ -12,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,15 +29,13 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-INTERVALS = 28
+INTERVALS = 32
 STIFFNESSES = 10.0 ** np.arange(-4.0, 9.0, 0.25)
 # The spline's knots are closest within this many radians of the terminator.
 LEAST_WIDTH, MOST_WIDTH = 0.02, 0.5
 # Chi-squared may be this much above the least that any stiffness reaches, if that is above 1.
 SLACK = 1.1
-RIDGE = 1e-12
-# Weighs the slope at the poles, which is 0 by symmetry, against everything else.
-SYMMETRY = 1e6
+RIDGE = 1e-10
 # Median of the absolute value of a normal variable.
 NORMAL_MEDIAN = 0.6745
 # A bin no path reached is not exact.
@@ -64,7 +68,10 @@ class Curve:
 
 
 def _stretch(theta: Array, width: float) -> Array:
-    return np.asarray(np.arcsinh((theta - math.pi / 2.0) / width))
+    """Coordinate in which the knots are uniform: half of them crowd around the terminator."""
+    x = theta - math.pi / 2.0
+    crowded = np.arcsinh(x / width) / math.asinh(math.pi / 2.0 / width)
+    return np.asarray(crowded + x * (2.0 / math.pi))
 
 
 class Smoother:
@@ -89,14 +96,22 @@ class Smoother:
         sigma, gain = fits[name].sigma, fits[name].gain
         rest = values - gain * MODELS[name](self._theta, sigma)
         width = float(np.clip(sigma, LEAST_WIDTH, MOST_WIDTH))
-        found = penalised_spline(self._theta, rest, np.maximum(errors, LEAST_ERROR), width)
+        base = partial(MODELS[name], sigma=sigma)
+        found = penalised_spline(self._theta, rest, np.maximum(errors, LEAST_ERROR), width, base)
         return Curve(name, sigma, gain, *found)
 
 
 def penalised_spline(
-    theta: Array, values: Array, errors: Array, width: float
+    theta: Array, values: Array, errors: Array, width: float, free: Callable[[Array], Array]
 ) -> tuple[float, float, Callable[[Array], Array]]:
     """Find the stiffest spline that agrees with the values within their errors.
+
+    Args:
+        theta: (B,) angles.
+        values: (B,) to smooth.
+        errors: (B,) their standard errors.
+        width: Of the crowd of knots around the terminator, radians.
+        free: A function of the angle; it, and it times sin theta, are not penalised.
 
     Returns:
         Chi-squared per degree of freedom, the degrees the spline took, and the spline.
@@ -109,22 +124,21 @@ def penalised_spline(
 
     def design(angles: Array) -> Array:
         place = np.clip(_stretch(angles, width), knots[3], knots[-4])
-        matrix: Array = BSpline.design_matrix(place, knots, 3).toarray()
-        return matrix
+        spline = BSpline.design_matrix(place, knots, 3).toarray()
+        model = free(angles)
+        return np.column_stack((spline, model, model * np.sin(angles)))
 
     basis = design(theta)
     count = basis.shape[1]
-    bend = np.diff(np.eye(count), 2, axis=0)
-    ends = np.zeros((2, count))
-    ends[0, [0, 2]] = ends[1, [-3, -1]] = -1.0, 1.0
+    bend = np.zeros((count - 4, count))
+    bend[:, :-2] = np.diff(np.eye(count - 2), 2, axis=0)
     normal = basis.T @ (basis / errors[:, None] ** 2)
     right = basis.T @ (values / errors**2)
     # One more unknown than data is no trouble: the penalty decides what the data leave open.
     scale = float(np.trace(normal)) / count
-    fixed = normal + SYMMETRY * scale * ends.T @ ends
     found = []
     for stiffness in STIFFNESSES:
-        system = fixed + stiffness * scale * bend.T @ bend
+        system = normal + stiffness * scale * bend.T @ bend
         system += RIDGE * scale * np.eye(count)
         freedom = float(np.trace(np.linalg.solve(system, normal)))
         coefficients = np.linalg.solve(system, right)
