@@ -173,12 +173,12 @@ def profile(shape: Profile = SKIN_PROFILE) -> Model:
 
     def evaluate(theta: ArrayLike, sigma: ArrayLike) -> NDArray[np.float64]:
         blur = np.asarray(sigma, dtype=np.float64)
-        result = 0.0
-        for width, part in zip(widths, parts, strict=True):
+        blurred = []
+        for width in widths:
             # 0 times infinity is 0 here: what does not spread stays Lambert at any curvature.
             own = blur * width if width > 0.0 else np.where(np.isnan(blur), blur, 0.0)
-            result = result + one(theta, own)[..., None] * part
-        return np.asarray(result)
+            blurred.append(one(theta, own))
+        return np.stack(blurred, axis=-1) @ parts
 
     moments = (rms / reference) ** 2 if reference > 0.0 else np.ones(3)
     key = f"{PROFILE} {_hash(shape.base, shape.widths, shape.weights)}"
