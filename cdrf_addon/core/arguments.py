@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
-def checked(
-    theta: ArrayLike, sigma: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def checked(theta: ArrayLike, sigma: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Fold theta into [0, pi]; both keep their shapes, which are to be broadcast.
 
     Args:
