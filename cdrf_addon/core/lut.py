@@ -41,7 +41,7 @@ class LutLayout:
     """
 
     width: int = 256
-    height: int = 128
+    height: int = 160
 
     def __post_init__(self) -> None:
         if self.width < 4 * SEAM_TEXELS or self.height < 2:
