@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .arguments import checked
+from .arguments import evaluate_forms
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -54,18 +54,7 @@ def sphere_reflectance(theta: ArrayLike, sigma: ArrayLike) -> NDArray[np.float64
     Raises:
         ParameterError: theta is not finite, or sigma is negative or not a number.
     """
-    angle, width = checked(theta, sigma)
-    shape = np.broadcast_shapes(angle.shape, width.shape)
-    result = np.array(np.broadcast_to(np.maximum(np.cos(angle), 0.0), shape))
-    wide = width >= SERIES_FROM
-    if wide.any():
-        series = _series(angle, np.maximum(width, SERIES_FROM))
-        np.copyto(result, series, where=wide)
-    narrow = np.broadcast_to((width > 0.0) & (width < SERIES_FROM), shape)
-    if narrow.any():
-        angle, width = np.broadcast_arrays(angle, width)
-        result[narrow] = _near_lambert(angle[narrow], width[narrow])
-    return np.clip(result, 0.0, 1.0, out=result)
+    return evaluate_forms(theta, sigma, SERIES_FROM, _near_lambert, _series)
 
 
 @cache
@@ -81,7 +70,7 @@ def lambert_coefficients(degree: int) -> NDArray[np.float64]:
 
 
 def _series(theta: NDArray[np.float64], sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sum the series; theta and sigma are only broadcast in the sum, so a table costs little."""
+    """Sum the series; theta and sigma are broadcast in the sum alone."""
     x = np.cos(theta)
     before, legendre = np.ones_like(x), x
     coefficients = lambert_coefficients(SERIES_DEGREE)
