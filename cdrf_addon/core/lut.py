@@ -40,7 +40,7 @@ class LutLayout:
         ParameterError: The table is too small to hold an axis and its margin.
     """
 
-    width: int = 256
+    width: int = 192
     height: int = 160
 
     def __post_init__(self) -> None:

@@ -23,9 +23,9 @@ pytestmark = pytest.mark.smoke
 # Issue 2 allows the shader 1e-4 before the film rounds; the table is all of that. The ring's worst
 # is at the terminator and small sigma, the sphere's where the light is overhead and sigma 0.4; of
 # the skin's Gaussians only some are at their worst at once.
-WORST = {RING: 7e-5, SPHERE: 9e-5, PROFILE: 5e-5}
+WORST = {RING: 8.5e-5, SPHERE: 8.5e-5, PROFILE: 7e-5}
 # The points below crowd where the error is largest.
-RMS = {RING: 2e-5, SPHERE: 2e-5, PROFILE: 1.5e-5}
+RMS = {RING: 2.5e-5, SPHERE: 2.5e-5, PROFILE: 2e-5}
 # From SIGMA_MAX on the table holds its last row: the ring is within exp(-12.5) / 2 = 1.87e-6 of its
 # limit there, the sphere within exp(-25) / 2; float32 adds 3e-8.
 BEYOND = {RING: 2e-6, SPHERE: 4e-8}
@@ -37,7 +37,7 @@ TOLERANCE = {
     # Rounding of the models themselves; arccos near 1 makes 1e-8 of angle, where f is flat.
     "float64": 1e-12,
     # Between the columns of one row, where blue still bends: 1/8 of f'' over a texel.
-    "last row": 2e-5,
+    "last row": 4e-5,
 }
 
 LAYOUTS = [DEFAULT_LAYOUT, LutLayout(512, 64), LutLayout(97, 33), LutLayout(12, 2)]
