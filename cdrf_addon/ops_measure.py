@@ -17,21 +17,27 @@ import bpy
 from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 
 from . import ids
-from .blender import fit_picture, reflectance_models
+from .blender import reflectance_models
+from .blender.fit_picture import make_picture, picture_path, show_picture
 from .blender.image import ensure_table
 from .blender.materials import active_skin, cdrf_node
 from .blender.read_material import read_scattering
 from .core.errors import CdrfError, ParameterError, SceneError
-from .core.material_fit import fit_material
+from .core.material_fit import MaterialFit, fit_material
+from .core.measured import MeasuredModel
+from .core.measurement import SphereMeasurement
 from .core.models import RING, SPHERE, measured_model
 from .core.progress import in_words, run_steps
 from .core.scattering import sigma0_per_radius
+from .core.summary import CONSTANT
 from .measure import DEFAULT_QUALITY, POLL_SECONDS, Request, cache_folder, measure_steps
 
 Colour = tuple[float, float, float]
 TICK_SECONDS = 0.1
 # Cycles has no albedo of 0 to measure.
 LEAST_ALBEDO = 1e-3
+# Shown in the picture where nothing is known of the object.
+MIDDLE_SCALE = 0.25
 QUALITY_ITEMS = (
     ("preview", "Preview", "A quarter of the default's time; shows which way it goes"),
     ("default", "Default", "About a minute on two cores"),
@@ -46,6 +52,8 @@ class _PathTraced(bpy.types.Operator):
     _timer: bpy.types.Timer
     _start: float
     _skin: str
+    _round: bool
+    SETTINGS: tuple[str, ...] = ("albedo", "radius", "quality", "seed")
 
     albedo: FloatVectorProperty(
         name="Albedo",
@@ -102,13 +110,14 @@ class _PathTraced(bpy.types.Operator):
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        for name in ("albedo", "radius", "quality", "seed"):
+        for name in self.SETTINGS:
             layout.prop(self, name)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         skin = active_skin(context.object)
         assert skin is not None
         self._skin = skin.name
+        self._round = context.object.data.cdrf.kind == CONSTANT
         try:
             self._steps = self._work(self._request())
             if context.window is None or bpy.app.background:
@@ -200,7 +209,15 @@ def own_scattering(skin: bpy.types.Material) -> tuple[Colour, Colour]:
     return albedo, (radius[0], radius[1], radius[2])
 
 
-def _aside(call: Callable[[], Any], part: float, what: str) -> Generator[tuple[float, str]]:
+def _smooth_and_fit(
+    spheres: SphereMeasurement, radius: Colour
+) -> tuple[MeasuredModel, MaterialFit]:
+    return MeasuredModel(spheres, radius), fit_material(spheres)
+
+
+def _aside(
+    call: Callable[[], Any], part: float, what: str
+) -> Generator[tuple[float, str], None, Any]:
     """Do a second or two of arithmetic in a thread, so that the window stays alive."""
     with ThreadPoolExecutor(1) as pool:
         running = pool.submit(call)
@@ -217,10 +234,26 @@ class CDRF_OT_measure(_PathTraced):
     bl_label = "Measure"
     bl_options = {"REGISTER", "UNDO"}
 
+    energy: EnumProperty(
+        name="Energy",
+        description=(
+            "A sphere that scatters far is up to a third brighter than an opaque one: light that "
+            "leaves one place arrives at another. A head is not"
+        ),
+        items=(
+            ("AUTO", "Auto", "As measured on spheres, kept on everything else"),
+            ("KEEP", "Keep", "As bright as an opaque surface; closest on heads and figures"),
+            ("MEASURED", "As Measured", "As bright as the sphere was; exact on spheres"),
+        ),
+        default="AUTO",
+    )
+    SETTINGS = ("albedo", "radius", "quality", "seed", "energy")
+
     def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
         found = yield from measure_steps(request, cache_folder())
-        radius = tuple(self.radius)
-        return (yield from _aside(partial(measured_model, found, radius), 1.0, "Smoothing"))
+        kept = self.energy == "KEEP" or (self.energy == "AUTO" and not self._round)
+        make = partial(measured_model, found, tuple(self.radius), keep_energy=kept)
+        return (yield from _aside(make, 1.0, "Smoothing"))
 
     def _finish(self, context: bpy.types.Context, found: Any) -> set[str]:
         skin = self._material()
@@ -241,13 +274,13 @@ class CDRF_OT_fit(_PathTraced):
     bl_options = {"REGISTER", "UNDO"}
 
     def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
-        found = yield from measure_steps(request, cache_folder())
-        fitted = yield from _aside(partial(fit_material, found), 1.0, "Fitting")
-        return found, fitted
+        spheres = yield from measure_steps(request, cache_folder())
+        work = partial(_smooth_and_fit, spheres, tuple(self.radius))
+        return (yield from _aside(work, 1.0, "Fitting"))
 
     def _finish(self, context: bpy.types.Context, found: Any) -> set[str]:
         skin = self._material()
-        measurement, fitted = found
+        model, fitted = found
         if reflectance_models.has_colour(skin):
             reflectance_models.set_kind(skin, SPHERE)
         name = "ring" if reflectance_models.kind_of_model(skin) == RING else "sphere"
@@ -258,7 +291,16 @@ class CDRF_OT_fit(_PathTraced):
         reflectance_models.set_channel_sigma0(skin, sigma0)
         for sentence in fitted.sentences():
             self.report({"INFO"}, sentence)
-        fit_picture.show(context, measurement, fitted)
+        # Of the spheres, the one that is curved as the middle of this object is.
+        scale = max(self.radius) * context.object.data.cdrf.median if context.object else 0.0
+        try:
+            path = picture_path(skin, cache_folder())
+            make_picture(model, fitted, scale or MIDDLE_SCALE, path)
+        except OSError as error:
+            self.report({"WARNING"}, f"The picture could not be written: {error.strerror}.")
+            return {"FINISHED"}
+        show_picture(context)
+        self.report({"INFO"}, f"CDRF: picture of the fit written to {path}")
         return {"FINISHED"}
 
 

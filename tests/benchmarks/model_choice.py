@@ -152,9 +152,9 @@ def to_markdown(results: dict[str, Any]) -> str:
         f"Measured on: {facts}.",
         "",
         "RMSE against Cycles (Random Walk, albedo 0.9, radius (1, 0.35, 0.2) · scale, one sun, no",
-        "light between surfaces, pixels in cast shadow left out; method in kappa_choice.md), mean of",
-        "R, G and B, in units of a white surface facing the sun. *One click*: the slider that follows",
-        "from the node's radius and albedo. *Best*: the slider that fits this case best.",
+        "light between surfaces, pixels in cast shadow left out; method in kappa_choice.md), mean",
+        "of R, G and B, in units of a white surface facing the sun. *One click*: the slider that",
+        "follows from the node's radius and albedo. *Best*: the slider that fits this case best.",
         "",
     ]
     for key, title in (("error clicked", "One click"), ("error best", "Best slider")):
