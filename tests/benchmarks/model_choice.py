@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which model of reflectance is closest to path tracing: writes docs/model_choice.md and .json.
 
-    ./dev python tests/benchmarks/model_choice.py        a quarter of an hour, most of it Cycles
+    ./dev python tests/benchmarks/model_choice.py        half an hour, most of it Cycles
 
 Shapes, lights and path-traced references are those of kappa_choice.py (and its cache), curvature is
 what the extension stores and the shader reads, the models are those an artist can choose. Each is
@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -32,6 +31,7 @@ from kappa_choice import (  # noqa: E402
     Array,
     Case,
     Shape,
+    Wax,
     least,
     make_cases,
     subdivided,
@@ -39,9 +39,8 @@ from kappa_choice import (  # noqa: E402
 from machine import machine  # noqa: E402
 
 from cdrf_addon.core.curvature import Options, curvature_steps  # noqa: E402
-from cdrf_addon.core.measured import MeasuredModel  # noqa: E402
 from cdrf_addon.core.mesh import TriMesh  # noqa: E402
-from cdrf_addon.core.models import Model, ring, sphere  # noqa: E402
+from cdrf_addon.core.models import Model, measured_model, ring, sphere  # noqa: E402
 from cdrf_addon.core.progress import run_steps  # noqa: E402
 from cdrf_addon.core.scale_space import LENGTH_PER_SIGMA0, KappaLevels, level_steps  # noqa: E402
 from cdrf_addon.core.scattering import sigma0_per_radius  # noqa: E402
@@ -52,6 +51,8 @@ SHAPES = {
     "bunny": ROOT / "tests" / "data" / "stanford_bunny.obj",
 }
 SEED = 20111106
+ALBEDOS = (0.2, 0.5, 0.75, 0.9, 0.99)
+ALBEDO_SCALE, ALBEDO_SIZE, ALBEDO_SAMPLES = 0.06, 128, 192
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,12 @@ class Pixels:
         values = self.levels.at(length)[:, None]
         return np.maximum(self.case.hits.interpolate(self.shape, values)[:, 0], 0.0)
 
+    def channel_error(self, channel: int, sigma0: float) -> float:
+        """RMSE of one channel shaded by the sphere model."""
+        sigma = sigma0 * self.kappa(LENGTH_PER_SIGMA0 * sigma0)
+        value = self.case.albedo * sphere().evaluate(self.case.theta, sigma)
+        return float(np.sqrt(((value - self.case.reference[:, channel]) ** 2).mean()))
+
     def error(self, contender: Contender, slider: float) -> float:
         """RMSE, mean over R, G, B."""
         off = contender.radiance(self.case.theta, self.kappa, slider) - self.case.reference
@@ -101,24 +108,51 @@ def levels_of(shape: Shape) -> KappaLevels:
     return run_steps(level_steps(run_steps(curvature_steps(mesh, Options()))))
 
 
-def contenders() -> list[Contender]:
+def contenders(cache: Path) -> list[Contender]:
     """Every model that can stand for the material of the references."""
-    request = Request(albedo=(ALBEDO,) * 3, seed=SEED)
-    with tempfile.TemporaryDirectory() as folder:
-        measured = MeasuredModel(measure(request, Path(folder)), RATIO)
-    slopes = {name: float(sigma0_per_radius(ALBEDO)) for name in ("RING", "SPHERE")}
-    table = Model("MEASURED", "MEASURED", measured.evaluate, colour=True)
-    return [
-        Contender("ring (the paper's), 3 look-ups", ring(), RATIO, slopes["RING"]),
-        Contender("sphere, 3 look-ups", sphere(), RATIO, slopes["SPHERE"]),
-        Contender("measured, 1 look-up", table, (), measured.sigma_per_scale),
+    spheres = measure(Request(albedo=(ALBEDO,) * 3, seed=SEED), cache)
+    slope = float(sigma0_per_radius(ALBEDO))
+    found = [
+        Contender("ring (the paper's), 3 look-ups", ring(), RATIO, slope),
+        Contender("sphere, 3 look-ups", sphere(), RATIO, slope),
     ]
+    for name, kept in (("as on spheres", False), ("energy kept", True)):
+        model, sigma0 = measured_model(spheres, RATIO, keep_energy=kept)
+        found.append(Contender(f"measured, {name}, 1 look-up", model, (), sigma0))
+    return found
+
+
+def albedo_study(cache: Path) -> list[dict[str, float]]:
+    """Best sigma0 of the sphere model over the scatter radius, per albedo and radius."""
+    shape = subdivided("head", SHAPES["head"], LEVEL)
+    levels = levels_of(shape)
+    waxes = [Wax(ALBEDO_SCALE, albedo) for albedo in ALBEDOS]
+    rows = []
+    for case in make_cases(shape, cache, ALBEDO_SIZE, ALBEDO_SAMPLES, waxes=waxes):
+        pixels = Pixels(case, shape, levels)
+        for channel, ratio in enumerate(RATIO):
+            radius = case.scale * ratio
+            best, error = least(partial(pixels.channel_error, channel))
+            clicked = float(sigma0_per_radius(case.albedo)) * radius
+            rows.append(
+                {
+                    "albedo": case.albedo,
+                    "radius": radius,
+                    "best": best / radius,
+                    "error best": error,
+                    "error clicked": pixels.channel_error(channel, clicked),
+                    "error Lambert": pixels.channel_error(channel, 0.0),
+                }
+            )
+            print(rows[-1], flush=True)
+    return rows
 
 
 def study(cache: Path, size: int, samples: int) -> dict[str, Any]:
     """Measure every contender on every case."""
     results: dict[str, Any] = {"machine": machine(), "cases": {}}
-    models = contenders()
+    results["albedos"] = albedo_study(cache)
+    models = contenders(cache)
     for name, path in SHAPES.items():
         shape = subdivided(name, path, LEVEL)
         levels = levels_of(shape)
@@ -173,7 +207,21 @@ def to_markdown(results: dict[str, Any]) -> str:
         )
         winner = min(means, key=lambda name: means[name])
         lines += ["", f"Closest: {winner} ({means[winner]:.3f} of Lambert's error).", ""]
-    return "\n".join(lines)
+    lines += [
+        "## σ₀ from the radius of Blender's node",
+        "",
+        "The head, sphere model: the σ₀ of the least error over the scatter radius, for each",
+        "channel of materials of one albedo; `cdrf_addon/core/scattering.py` runs through it.",
+        "",
+        "| albedo | radius | best σ₀ / radius | one click | Lambert's RMSE | best | one click |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in results["albedos"]:
+        slope = float(sigma0_per_radius(row["albedo"]))
+        errors = (row[f"error {name}"] for name in ("Lambert", "best", "clicked"))
+        numbers = [f"{row['albedo']:g}", f"{row['radius']:g}", f"{row['best']:.2f}", f"{slope:.2f}"]
+        lines.append("| " + " | ".join([*numbers, *(f"{error:.4f}" for error in errors)]) + " |")
+    return "\n".join([*lines, ""])
 
 
 def main() -> None:
