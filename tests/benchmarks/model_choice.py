@@ -218,9 +218,9 @@ def to_markdown(results: dict[str, Any]) -> str:
     ]
     for row in results["albedos"]:
         slope = float(sigma0_per_radius(row["albedo"]))
-        errors = (row[f"error {name}"] for name in ("Lambert", "best", "clicked"))
+        rmse = [row[f"error {name}"] for name in ("Lambert", "best", "clicked")]
         numbers = [f"{row['albedo']:g}", f"{row['radius']:g}", f"{row['best']:.2f}", f"{slope:.2f}"]
-        lines.append("| " + " | ".join([*numbers, *(f"{error:.4f}" for error in errors)]) + " |")
+        lines.append("| " + " | ".join([*numbers, *(f"{error:.4f}" for error in rmse)]) + " |")
     return "\n".join([*lines, ""])
 
 
