@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import bpy
@@ -106,7 +107,7 @@ def test_ctrl_c_ends_the_child_and_is_told(
     def interrupt(_: float) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(measuring.time, "sleep", interrupt)
+    monkeypatch.setattr(time, "sleep", interrupt)
     assert fit.main(["--no-cache", "--output", str(tmp_path / "out")]) == 130
     assert "Stopped" in capsys.readouterr().out
     assert list((tmp_path / "out").iterdir()) == []

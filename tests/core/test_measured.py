@@ -216,7 +216,7 @@ def test_impossible_measurements_are_refused(
     measurement: SphereMeasurement, change: dict[str, Array]
 ) -> None:
     with pytest.raises(MeasurementError):
-        replace(measurement, **change)
+        replace(measurement, **change)  # type: ignore[arg-type]
 
 
 def test_pixels_are_pooled_with_their_error() -> None:
