@@ -117,9 +117,9 @@ class MeasuredModel:
         shape, angle, width = angle.shape, angle.ravel(), width.ravel()
         result = np.empty((len(angle), 3))
         for channel in range(3):
-            scale = width * (self.ratio[channel] / self.sigma_per_scale)
-            if self.ratio[channel] == 0.0:
-                scale = np.zeros_like(width)  # not infinity times 0
+            factor = self.ratio[channel] / self.sigma_per_scale
+            # Infinity times a radius of 0 is no number.
+            scale = width * factor if factor > 0.0 else np.zeros_like(width)
             result[:, channel] = self._channel(angle, scale, channel)
         return result.reshape(*shape, 3)
 
