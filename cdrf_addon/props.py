@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 
 import bpy
@@ -16,11 +17,12 @@ from bpy.props import (
 )
 
 from . import ids
-from .blender.materials import cdrf_node, install
-from .blender.setup import scene_of_group
-from .blender.shader import ensure_shader_group, stamped_variant, variant_of
+from .blender import reflectance_models
+from .blender.materials import cdrf_node
+from .core.errors import CdrfError
 from .core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
 from .core.mesh import NO_CREASE
+from .core.models import MODEL_ITEMS, PROFILE, RING, SKIN_PROFILE, SPHERE
 from .core.summary import CONSTANT, FLAT, VARYING
 
 UNSET = -1.0
@@ -60,11 +62,24 @@ def _set_ratio(self: CdrfMaterial, value: tuple[float, ...]) -> None:
         return
     node.inputs[ids.SIGMA0_RATIO].default_value = ratio
     # As many look-ups as there are different sigma0, no more.
-    variant = stamped_variant(node.node_tree)
-    wanted = variant_of(ratio, variant.source)
-    where = scene_of_group(node.node_tree)
-    if wanted != variant and where is not None:
-        install(self.id_data, ensure_shader_group(wanted, *where))
+    reflectance_models.change_variant(self.id_data, ratio=ratio)
+
+
+def _get_model(self: CdrfMaterial) -> int:
+    kinds = [item[0] for item in MODEL_ITEMS]
+    return kinds.index(reflectance_models.kind_of_model(self.id_data))
+
+
+def _set_model(self: CdrfMaterial, value: int) -> None:
+    # A setter cannot report: what it cannot do it leaves. The operator cdrf.set_model says why.
+    with contextlib.suppress(CdrfError):
+        reflectance_models.set_kind(self.id_data, MODEL_ITEMS[value][0])
+
+
+def _profile_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
+    if reflectance_models.kind_of_model(self.id_data) == PROFILE:
+        with contextlib.suppress(CdrfError):
+            reflectance_models.set_kind(self.id_data, PROFILE)
 
 
 class CdrfMaterial(bpy.types.PropertyGroup):
@@ -103,6 +118,37 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         set=_set_ratio,
         options=set(),
     )
+    model: EnumProperty(
+        name="Model",
+        description="How the light that spreads under the surface shades it",
+        items=MODEL_ITEMS,
+        get=_get_model,
+        set=_set_model,
+        options=set(),
+    )
+    profile: StringProperty(
+        name="Profile",
+        description=(
+            "Gaussians of the diffusion profile, parted by semicolons. Each is four numbers: its "
+            "width in any unit, then its part of red, green and blue"
+        ),
+        default=SKIN_PROFILE.to_text(),
+        update=_profile_changed,
+        options=set(),
+    )
+    profile_base: EnumProperty(
+        name="Spread Along",
+        description="What each Gaussian of the profile is spread along",
+        items=[
+            (SPHERE, "Sphere", "Keeps the energy"),
+            (RING, "Ring", "As the paper does"),
+        ],
+        default=SPHERE,
+        update=_profile_changed,
+        options=set(),
+    )
+    chosen_model: StringProperty(options={"HIDDEN"})
+    measured: StringProperty(options={"HIDDEN"})
     chosen_sigma0: FloatProperty(default=UNSET, options={"HIDDEN"})
     chosen_ratio: FloatVectorProperty(size=3, default=(1.0, 1.0, 1.0), options={"HIDDEN"})
 

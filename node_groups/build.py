@@ -20,17 +20,23 @@ sys.path.insert(0, str(HERE.parent))
 import bpy  # noqa: E402  (the checkout must be importable first)
 
 from cdrf_addon.blender import groups  # noqa: E402
+from cdrf_addon.blender.image import ensure_table  # noqa: E402
+from cdrf_addon.core.models import name_of, profile, ring, sphere  # noqa: E402
 
 ASSET_FILE = HERE / "cdrf.blend"
 TOPOLOGY_FILE = HERE / "topology.txt"
+SKIN_GROUP = f"CDRF Reflectance {name_of(profile().key)} RGB"
 DESCRIPTIONS = {
     "CDRF Sun": "Direction, radiance and blur of a sun for CDRF Reflectance",
     "CDRF Point": "Direction, radiance and blur of a point light for CDRF Reflectance",
     "CDRF Spot": "Direction, radiance and blur of a spot light for CDRF Reflectance",
     "CDRF Area Rectangle": "Direction, radiance and blur of an area light for CDRF Reflectance",
     "CDRF Area Ellipse": "Direction, radiance and blur of a disk light for CDRF Reflectance",
-    "CDRF Reflectance RGB": "f(theta, sigma) of Kubo et al. 2011, one sigma for all channels",
-    "CDRF Reflectance R+G+B": "f(theta, sigma) of Kubo et al. 2011, a sigma for each channel",
+    "CDRF Reflectance Sphere RGB": "Diffusion on a sphere, one sigma for all channels",
+    "CDRF Reflectance Sphere R+G+B": "Diffusion on a sphere, a sigma for each channel",
+    "CDRF Reflectance Ring RGB": "f(theta, sigma) of Kubo et al. 2011, one sigma for all channels",
+    "CDRF Reflectance Ring R+G+B": "f(theta, sigma) of Kubo et al. 2011, a sigma for each channel",
+    SKIN_GROUP: "f(theta, sigma) of layered skin (d'Eon and Luebke 2007) in one look-up",
     "CDRF Diffused Curvature": "Curvature at the length over which a channel's light diffuses",
     "CDRF Curvature Display": "Curvature in hot colours",
     "CDRF Signed Curvature Display": "Curvature from blue hollows to red bulges",
@@ -42,7 +48,11 @@ def build_all() -> list[bpy.types.ShaderNodeTree]:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     built = [groups.light_group(kind) for kind in ("SUN", "POINT", "SPOT")]
     built += [groups.area_group(elliptic=elliptic) for elliptic in (False, True)]
-    built += [groups.reflectance_group(channels) for channels in groups.CHANNEL_SETS]
+    built += [
+        groups.reflectance_group(channels, ensure_table(model))
+        for model in (sphere(), ring(), profile())
+        for channels in groups.CHANNEL_SETS
+    ]
     built.append(groups.diffused_group())
     built += [groups.display_group(signed=signed) for signed in (False, True)]
     return built

@@ -22,16 +22,19 @@ from .. import ids
 from ..core.colour_scale import HOT, MARK_COLOUR, SIGNED
 from ..core.finite_light import VARIANCE_COEFFICIENTS
 from ..core.lut import DEFAULT_LAYOUT, VARIANCE_MAX
+from ..core.models import name_of
 from ..core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS
-from .image import ensure_lut_image
+from .image import Table
 from .nodetree import TreeBuilder, declare, ensure_group
 
-VERSION = 2
+VERSION = 4
 
 ELLIPTIC = {"DISK", "ELLIPSE"}
 
 CHANNEL_SETS = ("RGB", "R GB", "RG B", "RB G", "R G B")
 """Which channels share a sigma0, and so a look-up."""
+SEPARATE = CHANNEL_SETS[-1]
+PARTS = {"R": "Red", "G": "Green", "B": "Blue"}
 
 SOFT_RADIUS2 = 1e-6  # EEVEE treats a point light as a sphere of at least 1 mm
 
@@ -40,8 +43,10 @@ def _ends(b: TreeBuilder) -> tuple[Any, Any]:
     return b.node("NodeGroupInput").outputs, b.node("NodeGroupOutput").inputs
 
 
-def reflectance_group(channels: str) -> bpy.types.ShaderNodeTree:
+def reflectance_group(channels: str, table: Table) -> bpy.types.ShaderNodeTree:
     """f(theta, sigma) per channel, one texture look-up per part of `channels` ("RG B": two).
+
+    Of a table with colour, each channel takes its own part of what was looked up.
 
     Wiring, with K, offset and scale from core/lut.py:
 
@@ -63,7 +68,6 @@ def reflectance_group(channels: str) -> bpy.types.ShaderNodeTree:
         across = b.math("MULTIPLY_ADD", b.math("SINE", p), 0.5, 0.5)
         along = b.math("MULTIPLY_ADD", b.math("COSINE", p), 0.5, 0.5)
         variance = dict(zip("RGB", b.separate(given[ids.VARIANCE]), strict=True))
-        image = ensure_lut_image()
         f = {}
         for shared in channels.split():
             # The limit first: MINIMUM(limit, NaN) is the limit, so a bad attribute stays finite.
@@ -73,7 +77,7 @@ def reflectance_group(channels: str) -> bpy.types.ShaderNodeTree:
             texture = b.node(
                 "ShaderNodeTexImage",
                 f"Look-up {shared}",
-                image=image,
+                image=table.image,
                 projection="TUBE",
                 interpolation="Linear",
                 extension="EXTEND",
@@ -82,12 +86,12 @@ def reflectance_group(channels: str) -> bpy.types.ShaderNodeTree:
             value = b.node("ShaderNodeSeparateColor")
             b.feed(value.inputs["Color"], texture.outputs["Color"])
             for channel in shared:
-                f[channel] = value.outputs["Red"]
+                f[channel] = value.outputs[PARTS[channel] if table.colour else "Red"]
         b.feed(result[ids.REFLECTANCE], b.combine(f["R"], f["G"], f["B"]))
 
-    parts = "+".join(channels.split())
-    role = f"{ids.ROLE_REFLECTANCE} {channels}"
-    return ensure_group(f"CDRF Reflectance {parts}", role, VERSION, build)
+    name = f"CDRF Reflectance {name_of(table.key)} {'+'.join(channels.split())}"
+    role = f"{ids.ROLE_REFLECTANCE} {channels} {table.key}"
+    return ensure_group(name, role, VERSION, build)
 
 
 def diffused_group() -> bpy.types.ShaderNodeTree:

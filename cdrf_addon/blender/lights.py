@@ -30,6 +30,8 @@ CONSTANTS = {
     "AREA": 1.0 / math.pi**2,
 }
 ONE_SIZE = {"SQUARE", "DISK"}
+# A sun of this angle blurs the terminator by 0.8 degrees.
+HARD_SUN = math.radians(3.0)
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class SceneLight:
     object: bpy.types.Object
     kind: str
     """Type of the light, and shape of an area light: "SUN", "AREA ELLIPSE"."""
+    soft: bool = True
+    """Whether it is, or may become, so large that its size blurs the terminator visibly."""
 
     @property
     def type(self) -> str:
@@ -49,6 +53,16 @@ class SceneLight:
 def kind_of(light: bpy.types.Light) -> str:
     """Describe what decides a light's node branch; see `SceneLight.kind`."""
     return f"AREA {light.shape}" if light.type == "AREA" else light.type
+
+
+def is_soft(item: bpy.types.Object) -> bool:
+    """Tell whether a light has a size that counts, or one that is animated."""
+    light = item.data
+    if light.type == "AREA" or light.animation_data is not None:
+        return True
+    if light.type == "SUN":
+        return bool(light.angle > HARD_SUN)
+    return bool(light.shadow_soft_size > 0.0)
 
 
 def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[SceneLight]:
@@ -63,7 +77,7 @@ def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> lis
             continue
         if item.hide_render and not _animates(item, "hide_render"):
             continue
-        found.append(SceneLight(item, kind_of(item.data)))
+        found.append(SceneLight(item, kind_of(item.data), is_soft(item)))
     return sorted(found, key=lambda light: light.object.name)
 
 

@@ -36,7 +36,7 @@ from ..core.summary import (
     CurvatureSummary,
     summarise,
 )
-from . import display, shader, state
+from . import display, reflectance_models, shader, state
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
 from .mesh_io import (
@@ -51,6 +51,7 @@ from .mesh_io import (
     to_original_vertices,
     write_curvature,
 )
+from .read_material import read_scattering
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -72,6 +73,8 @@ class Report:
     computed: int = 0
     seconds: float = 0.0
     warnings: list[str] = field(default_factory=list)
+    read: list[str] = field(default_factory=list)
+    """Materials whose scatter distance was read from their own shader nodes."""
 
     def sentence(self) -> str:
         """Sum it up in one line."""
@@ -81,6 +84,8 @@ class Report:
             parts.append(f"curvature at {self.vertices:,} vertices in {self.seconds:.2f} s")
         else:
             parts.append("curvature was up to date")
+        if self.read:
+            parts.append(f"scatter distance of {', '.join(self.read)} taken from its nodes")
         return ", ".join(parts)
 
 
@@ -409,12 +414,18 @@ class Setup:
         settings = material.cdrf
         fresh = cdrf_node(material) is None
         ratio = tuple(settings.sigma0_ratio)
-        group = shader.ensure_shader_group(shader.variant_of(ratio, source), self.scene, lights)
+        wanted = shader.variant_of(ratio, source, reflectance_models.ensure_chosen(material))
+        group = shader.ensure_shader_group(wanted, self.scene, lights)
         node = install(material, group)
         work = self._work_of(material)
         if fresh:
             node.inputs[ids.SIGMA0_RATIO].default_value = ratio
-            if settings.chosen_sigma0 < 0.0:
+            own = read_scattering(material) if settings.chosen_sigma0 < 0.0 else None
+            if own is not None:
+                reflectance_models.set_scattering(material, own)
+                self.report.read.append(material.name)
+                self.report.warnings += [f"'{material.name}': {note}" for note in own.notes]
+            elif settings.chosen_sigma0 < 0.0:
                 settings.chosen_sigma0 = _first_sigma0(work)
             node.inputs[ids.SIGMA0].default_value = settings.chosen_sigma0
         if source == shader.CONSTANT:
@@ -494,18 +505,6 @@ def linked_skins(item: bpy.types.Object) -> list[bpy.types.Material]:
 def _present_source(material: bpy.types.Material) -> str:
     node = cdrf_node(material)
     return shader.stamped_variant(node.node_tree).source if node is not None else ""
-
-
-def scene_of_group(
-    group: bpy.types.ShaderNodeTree,
-) -> tuple[bpy.types.Scene, list[SceneLight]] | None:
-    """Return the scene a shader group was made for and its lights; the open one if it is gone."""
-    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
-    if scene is None:
-        return None
-    current = bpy.context.view_layer
-    layer = current if bpy.context.scene == scene else scene.view_layers[0]
-    return scene, scene_lights(scene, layer)
 
 
 def remove_unused_groups() -> None:

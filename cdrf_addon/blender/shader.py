@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scene's CDRF shader group: the sum over its lights of paper Eq. 5, and nothing it lacks.
 
-A variant is made for each way of having curvature and of sharing sigma0 between channels; the
-branches are one per light. Wiring:
+A variant is made for each way of having curvature and of sharing sigma0 between channels, and for
+each model of reflectance; the branches are one per light. Wiring:
 
     attribute levels -> kappa at the channel's length                 |
                      -> x Sigma0 x Ratio -> squared = variance --------+
     Normal (or geometry) --+                                          |
-    light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance
+    light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance/moment
             -> Radiance ------------------------------> x f --> sum over i --> x Base Color
                                                                            x Strength -> Emission
 """
@@ -21,11 +21,16 @@ from typing import Any
 import bpy
 
 from .. import ids
-from .groups import diffused_group, light_group, reflectance_group
+from ..core.models import RING, name_of
+from .groups import SEPARATE, diffused_group, light_group, reflectance_group
+from .image import Table, find_table, table_of
 from .lights import SceneLight, drive_light
 from .nodetree import TreeBuilder, declare, is_intact, rebuild
 
-VERSION = 4
+VERSION = 5
+
+# A channel narrower than a hundredth of the widest is Lambert in every row of the table.
+LEAST_MOMENT = 1e-4
 
 FLAT, CONSTANT, ATTRIBUTE, SCALED = "flat", "constant", "attribute", "scaled attribute"
 """Where kappa comes from: nowhere, the Curvature input, the mesh, the mesh and the object."""
@@ -39,21 +44,24 @@ class Variant:
     """Look-ups: see groups.CHANNEL_SETS."""
     source: str
     """FLAT, CONSTANT, ATTRIBUTE or SCALED."""
+    model: str
+    """Key of the model of reflectance."""
 
     @property
     def name(self) -> str:
         """Name of the node group."""
         lookups = "+".join(self.channels.split())
-        return f"CDRF {lookups}" + ("" if self.source == ATTRIBUTE else f" {self.source}")
+        source = "" if self.source == ATTRIBUTE else f" {self.source}"
+        return f"CDRF {name_of(self.model)} {lookups}{source}"
 
 
-def variant_of(ratio: Sequence[float], source: str) -> Variant:
+def variant_of(ratio: Sequence[float], source: str, model: str) -> Variant:
     """Choose the variant with one look-up per distinct sigma0.
 
     A flat mesh has sigma = 0 in every channel, whatever the ratio: one look-up.
     """
     if source == FLAT:
-        return Variant("RGB", FLAT)
+        return Variant("RGB", FLAT, model)
     red, green, blue = ratio
     if red == green == blue:
         channels = "RGB"
@@ -65,12 +73,24 @@ def variant_of(ratio: Sequence[float], source: str) -> Variant:
         channels = "RB G"
     else:
         channels = "R G B"
-    return Variant(channels, source)
+    return Variant(channels, source, model)
 
 
 def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
-    """Read back the variant of a group made by `ensure_shader_group`."""
-    return Variant(group[ids.CHANNELS_KEY], group[ids.SOURCE_KEY])
+    """Read back the variant of a group made by `ensure_shader_group`.
+
+    The paper's ring was the only model before version 5.
+    """
+    return Variant(group[ids.CHANNELS_KEY], group[ids.SOURCE_KEY], group.get(ids.MODEL_KEY, RING))
+
+
+def branch_lookups(table: Table, variant: Variant, light: SceneLight) -> str:
+    """Choose which channels share a look-up for a light.
+
+    Where one look-up of a table with colour serves all channels, a light of some size needs three:
+    its own blur adds to a wide channel's and to a narrow one's in different parts.
+    """
+    return SEPARATE if table.colour and light.soft else variant.channels
 
 
 def is_shader_group(group: bpy.types.ShaderNodeTree | None) -> bool:
@@ -88,12 +108,14 @@ def ensure_shader_group(
         group[ids.ROLE_KEY] = ids.ROLE_SHADER
         group[ids.CHANNELS_KEY] = variant.channels
         group[ids.SOURCE_KEY] = variant.source
+        group[ids.MODEL_KEY] = variant.model
         group[ids.SCENE_KEY] = scene.name
         group.color_tag = "SHADER"
         group.description = "Curvature-dependent translucency (Kubo et al. 2011), made by CDRF"
     elif is_current(group, lights):
         return group
-    rebuild(group, lambda builder: _build(builder, variant, lights))
+    table = table_of(variant.model)
+    rebuild(group, lambda builder: _build(builder, variant, lights, table))
     group[ids.VERSION_KEY] = VERSION
     return group
 
@@ -112,18 +134,22 @@ def _find(variant: Variant, scene: bpy.types.Scene) -> bpy.types.ShaderNodeTree 
 
 def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -> bool:
     """Tell whether the group has exactly these lights, each of the type it was wired for."""
-    wanted = {(light.object, light.kind) for light in lights}
-    return (
-        group.get(ids.VERSION_KEY) == VERSION
-        and is_intact(group)
-        and set(wired_lights(group)) == wanted
-    )
+    if group.get(ids.VERSION_KEY) != VERSION or not is_intact(group):
+        return False
+    variant = stamped_variant(group)
+    table = find_table(variant.model)
+    if table is None:
+        return False
+    wanted = {(light.object, light.kind, branch_lookups(table, variant, light)) for light in lights}
+    return set(wired_lights(group)) == wanted
 
 
 def wired_lights(
     group: bpy.types.ShaderNodeTree,
-) -> list[tuple[bpy.types.Object | None, str]]:
-    """List the lights of a group and the kind they were wired for; None where one was deleted.
+) -> list[tuple[bpy.types.Object | None, str, str]]:
+    """List the lights of a group, the kind and the look-ups they were wired for.
+
+    None stands for a light that was deleted.
 
     The drivers' targets are asked, not names: they survive renaming.
     """
@@ -134,7 +160,7 @@ def wired_lights(
             target = curve.driver.variables[0].targets[0].id
             targets[bpy.utils.unescape_identifier(escaped)] = target
     return [
-        (targets.get(node.name), node[ids.LIGHT_KEY])
+        (targets.get(node.name), node[ids.LIGHT_KEY], node.get(ids.LOOKUPS_KEY, ""))
         for node in group.nodes
         if ids.LIGHT_KEY in node
     ]
@@ -178,7 +204,7 @@ def _declare(tree: bpy.types.ShaderNodeTree) -> None:
     declare(tree, ids.SHADER, "Shader", output=True)
 
 
-def _build(b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight]) -> None:
+def _build(b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight], table: Table) -> None:
     _declare(b.tree)
     if variant.source == CONSTANT:
         declare(
@@ -190,23 +216,39 @@ def _build(b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight]) -> No
     if lights:
         normal = _normal(b, given[ids.NORMAL])
         variance = _skin_variance(b, variant, given)
-        reflectance = reflectance_group(variant.channels)
     for light in lights:
         node = b.group(light_group(light.kind), light.object.name)
         node[ids.LIGHT_KEY] = light.kind
+        node[ids.LOOKUPS_KEY] = lookups = branch_lookups(table, variant, light)
         drive_light(b.tree, node, light)
         lit = node.outputs
         f = b.group(
-            reflectance,
+            reflectance_group(lookups, table),
             f"Reflectance {node.name}",
             Cosine=b.vector("DOT_PRODUCT", normal, lit[ids.DIRECTION]),
-            Variance=b.vector("ADD", variance, lit[ids.VARIANCE]),
+            Variance=_with_light(b, variance, lit[ids.VARIANCE], lookups, table),
         ).outputs[ids.REFLECTANCE]
         total = b.vector("MULTIPLY_ADD", f, lit[ids.RADIANCE], total)
     emission = b.node("ShaderNodeEmission")
     b.feed(emission.inputs["Color"], b.vector("MULTIPLY", total, given[ids.BASE_COLOR]))
     b.feed(emission.inputs["Strength"], given[ids.STRENGTH])
     b.feed(result[ids.SHADER], emission.outputs["Emission"])
+
+
+def _with_light(b: TreeBuilder, skin: Any, light: Any, lookups: str, table: Table) -> Any:
+    """Add a light's variance to the skin's, in the units of the table's rows.
+
+    A channel whose blur is sqrt(m) sigma wide needs 1 / m of the light's variance on top of
+    sigma^2; channels that share a look-up take the widest one's.
+    """
+    if not table.colour:
+        return b.vector("ADD", skin, light)
+    moments = dict(zip("RGB", table.moments, strict=True))
+    share = {}
+    for shared in lookups.split():
+        widest = max(moments[channel] for channel in shared)
+        share.update(dict.fromkeys(shared, 1.0 / max(widest, LEAST_MOMENT)))
+    return b.vector("MULTIPLY_ADD", light, (share["R"], share["G"], share["B"]), skin)
 
 
 def _normal(b: TreeBuilder, given: Any) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import ids
 from . import shader
+from .image import Table, find_table
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, skin_output
 from .mesh_io import base_fingerprint, has_curvature, linear_part
@@ -59,7 +60,10 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
         return ""
     wired = shader.wired_lights(group)
     now = {light.object: light.kind for light in lights}
-    before = {item: kind for item, kind in wired if item is not None}
+    before = {item: kind for item, kind, _ in wired if item is not None}
+    table = find_table(shader.stamped_variant(group).model)
+    if table is None:
+        return "the reflectance table was deleted; choose the model again"
     parts = []
     for item, kind in now.items():
         if item not in before:
@@ -69,7 +73,15 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
     gone = len(wired) - len(before) + sum(item not in now for item in before)
     if gone:
         parts.append(f"{gone} light{'s are' if gone > 1 else ' is'} gone or hidden")
+    if not parts:
+        resized = [light.object.name for light in lights if _other_lookups(group, table, light)]
+        parts = [f"light '{name}' got another size" for name in resized]
     return "; ".join(parts) or "the node group is incomplete or of an older version"
+
+
+def _other_lookups(group: bpy.types.ShaderNodeTree, table: Table, light: SceneLight) -> bool:
+    wanted = shader.branch_lookups(table, shader.stamped_variant(group), light)
+    return (light.object, light.kind, wanted) not in shader.wired_lights(group)
 
 
 def reasons_to_update(
@@ -96,7 +108,7 @@ def reasons_to_update(
             reasons.append(f"Lights: {due}.")
         variant = shader.stamped_variant(group)
         ratio = tuple(node.inputs[ids.SIGMA0_RATIO].default_value)
-        if shader.variant_of(ratio, variant.source) != variant:
+        if shader.variant_of(ratio, variant.source, variant.model) != variant:
             reasons.append("The colour ratio was changed in the node.")
         if variant.source in {shader.ATTRIBUTE, shader.SCALED} and not has_curvature(item.data):
             reasons.append(f"'{item.name}' has no curvature yet.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The two-dimensional look-up table of the reflectance, and the mapping of its axes.
+"""The two-dimensional look-up table of a reflectance model, and the mapping of its axes.
 
 Columns: q = sign(c) sqrt|c| of c = cos theta, dense at the terminator where f bends.
 Rows:    w = (variance / VARIANCE_MAX)^(1/4) = sqrt(sigma / SIGMA_MAX), dense at small sigma.
@@ -18,12 +18,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import ParameterError
-from .reflectance import reflectance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# From here on f differs from its limit 1/pi by less than exp(-SIGMA_MAX^2 / 2) / 2 = 1.9e-6.
+    from .models import Model
+
+# From here on the ring differs from its limit 1/pi by less than exp(-SIGMA_MAX^2 / 2) / 2 = 1.9e-6,
+# the sphere from 1/4 by less than exp(-SIGMA_MAX^2) / 2 = 7e-12.
 SIGMA_MAX = 5.0
 VARIANCE_MAX = SIGMA_MAX**2
 # Texels left free between the seam of the tube and the ends of the cosine axis.
@@ -38,8 +40,8 @@ class LutLayout:
         ParameterError: The table is too small to hold an axis and its margin.
     """
 
-    width: int = 256
-    height: int = 128
+    width: int = 192
+    height: int = 160
 
     def __post_init__(self) -> None:
         if self.width < 4 * SEAM_TEXELS or self.height < 2:
@@ -80,10 +82,14 @@ def sigma_axis(layout: LutLayout = DEFAULT_LAYOUT) -> NDArray[np.float64]:
     return np.asarray(SIGMA_MAX * w**2)
 
 
-def build_lut(layout: LutLayout = DEFAULT_LAYOUT) -> NDArray[np.float32]:
-    """Tabulate f, shape (height, width), row 0 at sigma = 0; float64 until it is stored."""
+def build_lut(model: Model, layout: LutLayout = DEFAULT_LAYOUT) -> NDArray[np.float32]:
+    """Tabulate a model, row 0 at sigma = 0; float64 until it is stored.
+
+    Returns:
+        (height, width), and where the model has colour (height, width, 3).
+    """
     theta = np.arccos(cosine_axis(layout))
-    return reflectance(theta[None, :], sigma_axis(layout)[:, None]).astype(np.float32)
+    return model.evaluate(theta[None, :], sigma_axis(layout)[:, None]).astype(np.float32)
 
 
 def sample_lut(
@@ -95,13 +101,13 @@ def sample_lut(
     """Read the table as the shader does: same mapping, ideal bilinear filter, in float64.
 
     Args:
-        table: From `build_lut`, shape (height, width).
+        table: From `build_lut`, (height, width) or (height, width, 3).
         cosine: cos theta in [-1, 1], any shape.
         variance: sigma^2 >= 0, broadcast against cosine.
         layout: The layout the table was built with.
 
     Returns:
-        f interpolated, of the broadcast shape.
+        f interpolated, of the broadcast shape, with a last axis of 3 where the table has one.
     """
     q = np.sign(cosine) * np.sqrt(np.abs(cosine))
     u = (1.0 - layout.seam_factor * q) / 2.0
@@ -112,6 +118,8 @@ def sample_lut(
     column = np.minimum(x.astype(np.int64), layout.width - 2)
     row = np.minimum(y.astype(np.int64), layout.height - 2)
     along, up = x - column, y - row
+    if table.ndim == 3:
+        along, up = along[..., None], up[..., None]
     wide = table.astype(np.float64)
     lower = wide[row, column] * (1.0 - along) + wide[row, column + 1] * along
     upper = wide[row + 1, column] * (1.0 - along) + wide[row + 1, column + 1] * along

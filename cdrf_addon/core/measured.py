@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .arguments import angle_and_width
+from .arguments import checked
 from .errors import MeasurementError
 from .material_fit import sigma_per_scale as fitted_sigma_per_scale
 from .measurement import SphereMeasurement, equator_weights
@@ -90,7 +90,9 @@ class MeasuredModel:
     def energy(self) -> Array:
         """Mean over the sphere relative to Lambert's, of the smoothed rows, (S, 3)."""
         rows = self._rows + self._lambert
-        return np.asarray(2.0 * np.trapezoid(rows * np.sin(self._theta), self._theta, axis=-1))
+        # numpy 1.26, which Blender 4.5 has, knows no trapezoid.
+        heights = rows * np.sin(self._theta)
+        return np.asarray((heights[..., 1:] + heights[..., :-1]) @ np.diff(self._theta))
 
     def chi_squared(self) -> Array:
         """Per degree of freedom, of each smoothed curve, (S, 3)."""
@@ -111,7 +113,8 @@ class MeasuredModel:
         Raises:
             ParameterError: theta is not finite, or sigma is negative or not a number.
         """
-        angle, width, shape = angle_and_width(theta, sigma)
+        angle, width = np.broadcast_arrays(*checked(theta, sigma))
+        shape, angle, width = angle.shape, angle.ravel(), width.ravel()
         result = np.empty((len(angle), 3))
         for channel in range(3):
             factor = self.ratio[channel] / self.sigma_per_scale

@@ -27,8 +27,8 @@ def test_wiring_is_as_committed() -> None:
 
 def test_asset_file_holds_the_groups(rig: Rig) -> None:
     with bpy.data.libraries.load(str(FOLDER / "cdrf.blend"), assets_only=True) as (source, wanted):
-        assert {"CDRF Sun", "CDRF Reflectance RGB"} <= set(source.node_groups)
-        wanted.node_groups = ["CDRF Reflectance RGB"]
+        assert {"CDRF Sun", "CDRF Reflectance Sphere RGB"} <= set(source.node_groups)
+        wanted.node_groups = ["CDRF Reflectance Sphere RGB"]
     group = wanted.node_groups[0]
     texture = next(node for node in group.nodes if node.type == "TEX_IMAGE")
     assert texture.image.packed_file is not None and texture.image.is_float

@@ -16,7 +16,7 @@ import pytest
 from rig import Rig, cdrf_node
 from tolerances import WRITTEN
 
-from cdrf_addon.core.reflectance import reflectance
+from cdrf_addon.core.heat_kernel import sphere_reflectance
 
 SIGMA = 0.3
 
@@ -45,7 +45,7 @@ def lit(rig: Rig) -> Lit:
 
 def assert_lit_from(lit: Lit, direction: np.ndarray, energy: float = 1.0) -> None:
     cosine = np.clip(lit.normal[lit.covered] @ (direction / np.linalg.norm(direction)), -1.0, 1.0)
-    expected = energy * reflectance(np.arccos(cosine), SIGMA)
+    expected = energy * sphere_reflectance(np.arccos(cosine), SIGMA)
     error = lit.rig.render()[lit.covered][:, 0] - expected
     assert np.abs(error).max() <= WRITTEN.worst * max(energy, 1.0)
 
@@ -118,7 +118,7 @@ def test_moved_point_light(rig: Rig) -> None:
     to_light = np.array(lamp.location) - point[covered]
     distance = np.linalg.norm(to_light, axis=1)
     cosine = (normal[covered] * to_light).sum(axis=1) / distance
-    expected = 6.0 / distance**2 * reflectance(np.arccos(np.clip(cosine, -1.0, 1.0)), SIGMA)
+    expected = 6.0 / distance**2 * sphere_reflectance(np.arccos(np.clip(cosine, -1.0, 1.0)), SIGMA)
     error = rig.render()[covered][:, 0] - expected
     assert np.abs(error).max() <= WRITTEN.worst * expected.max()
 
@@ -161,7 +161,7 @@ def test_file_renders_right_without_the_extension(lit: Lit, tmp_path: Path) -> N
     mover.rotation_euler = (0.0, 0.0, 0.0)
     direction = axis_of(lit.sun)
     cosine = np.clip(lit.normal[lit.covered] @ direction, -1.0, 1.0)
-    error = pixels[lit.covered][:, 0] - reflectance(np.arccos(cosine), SIGMA)
+    error = pixels[lit.covered][:, 0] - sphere_reflectance(np.arccos(cosine), SIGMA)
     assert np.abs(error).max() <= WRITTEN.worst
 
 

@@ -12,7 +12,7 @@ from rig import Rig, cdrf_node
 from tolerances import SHADER
 
 from cdrf_addon import ids
-from cdrf_addon.core.reflectance import reflectance
+from cdrf_addon.core.heat_kernel import sphere_reflectance
 from cdrf_addon.core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS, KappaLevels
 
 FROM_THE_SIDE = (math.radians(50.0), 0.0, math.radians(70.0))
@@ -58,7 +58,7 @@ def test_each_channel_takes_kappa_at_its_own_length(rig: Rig) -> None:
         for channel, factor in enumerate(ratio):
             own = sigma0 * factor
             kappa = float(levels.at(LENGTH_PER_SIGMA0 * own)[0])
-            error = np.abs(value[covered][:, channel] - reflectance(theta, own * kappa))
+            error = np.abs(value[covered][:, channel] - sphere_reflectance(theta, own * kappa))
             assert error.max() <= SHADER.worst, (sigma0, channel, error.max())
 
 
@@ -84,5 +84,5 @@ def test_an_object_twice_as_large_scatters_like_the_measured_one_at_half_the_dis
         theta = np.arccos(np.clip(normals[covered] @ towards, -1.0, 1.0))
         kappa = float(levels.at(LENGTH_PER_SIGMA0 * 0.4 / size)[0]) / size
         value, _ = rig.render_exact(shown, "Shader", -0.01, 1.01)
-        error = np.abs(value[covered][:, 0] - reflectance(theta, 0.4 * kappa))
+        error = np.abs(value[covered][:, 0] - sphere_reflectance(theta, 0.4 * kappa))
         assert error.max() <= SHADER.worst, (size, error.max())

@@ -12,7 +12,9 @@ import pytest
 from rig import Rig, cdrf_node
 from tolerances import FOUR_LIGHTS, SHADER, WRITTEN, Bound
 
-from cdrf_addon.core.reflectance import reflectance
+from cdrf_addon.core.finite_light import finite_light
+from cdrf_addon.core.heat_kernel import sphere_reflectance
+from cdrf_addon.core.models import PROFILE, RING, SPHERE, profile, ring, sphere
 
 SIGMAS = (0.0, 0.01, 0.05, 0.1, 0.3, 1.0, 3.0, 30.0)
 FROM_THE_SIDE = (math.radians(50.0), 0.0, math.radians(70.0))
@@ -47,24 +49,60 @@ def test_written_pixels_follow_the_reflectance_for_every_sigma(rig: Rig) -> None
         sphere.data.materials[0].cdrf.sigma0 = sigma
         pixels = rig.render()
         assert np.isfinite(pixels).all()
-        error = pixels[covered][:, :3] - reflectance(theta, sigma)[:, None]
+        error = pixels[covered][:, :3] - sphere_reflectance(theta, sigma)[:, None]
         assert_within(error, WRITTEN, f"sigma {sigma:g}")
 
 
-def test_shader_value_before_the_film_rounds_it(rig: Rig) -> None:
+@pytest.mark.parametrize("kind", [SPHERE, RING])
+def test_shader_value_before_the_film_rounds_it(rig: Rig, kind: str) -> None:
+    reflectance = {SPHERE: sphere(), RING: ring()}[kind].evaluate
     sun = rig.light("SUN", energy=math.pi, angle=0.0, rotation=FROM_THE_SIDE)
-    sphere = white_sphere(rig)
-    material = sphere.data.materials[0]
+    ball = white_sphere(rig)
+    material = ball.data.materials[0]
+    material.cdrf.model = kind
     # Three sigmas at once, one per channel: also the test of the three look-ups.
     material.cdrf.sigma0_ratio = (1.0, 0.1, 0.01)
-    normals, covered = rig.normals(sphere)
+    normals, covered = rig.normals(ball)
     theta = np.arccos(np.clip(normals[covered] @ towards(sun), -1.0, 1.0))
-    for sigma in (0.0, 0.3, 1.0, 3.0, 30.0):
+    for sigma in (0.0, 0.39, 1.0, 3.0, 30.0):
         material.cdrf.sigma0 = sigma
-        value, _ = rig.render_exact(sphere, "Shader", -0.01, 1.01)
+        value, _ = rig.render_exact(ball, "Shader", -0.01, 1.01)
         for channel, factor in enumerate((1.0, 0.1, 0.01)):
             error = value[covered][:, channel] - reflectance(theta, sigma * factor)
-            assert_within(error, SHADER, f"sigma {sigma * factor:g}, channel {channel}")
+            assert_within(error, SHADER, f"{kind}, sigma {sigma * factor:g}, channel {channel}")
+
+
+def test_one_look_up_serves_the_channels_of_a_profile(rig: Rig) -> None:
+    sun = rig.light("SUN", energy=math.pi, angle=0.0, rotation=FROM_THE_SIDE)
+    ball = white_sphere(rig)
+    material = ball.data.materials[0]
+    material.cdrf.model = PROFILE
+    assert cdrf_node(ball).node_tree["cdrf_channels"] == "RGB"
+    normals, covered = rig.normals(ball)
+    theta = np.arccos(np.clip(normals[covered] @ towards(sun), -1.0, 1.0))
+    for sigma in (0.0, 0.1, 1.0):
+        material.cdrf.sigma0 = sigma
+        value, _ = rig.render_exact(ball, "Shader", -0.01, 1.01)
+        error = value[covered][:, :3] - profile().evaluate(theta, sigma)
+        assert_within(error, SHADER, f"skin, sigma {sigma:g}")
+
+
+def test_a_large_light_blurs_each_channel_of_a_profile_alike(rig: Rig) -> None:
+    # A sun of 40 degrees over skin that hardly scatters: all channels see its own blur alone.
+    sun = rig.light("SUN", energy=math.pi, angle=math.radians(40.0), rotation=FROM_THE_SIDE)
+    ball = white_sphere(rig)
+    material = ball.data.materials[0]
+    material.cdrf.model = PROFILE
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+    material.cdrf.sigma0 = 1e-4
+    normals, covered = rig.normals(ball)
+    theta = np.arccos(np.clip(normals[covered] @ towards(sun), -1.0, 1.0))
+    variance, gain = finite_light(math.sin(math.radians(20.0)) ** 2)
+    value, _ = rig.render_exact(ball, "Shader", -0.01, 1.2)
+    expected = gain * sphere_reflectance(theta, math.sqrt(variance))
+    for channel, bound in enumerate((0.03, 0.03, 0.03)):
+        error = np.abs(value[covered][:, channel] - expected).max()
+        assert error <= bound, (channel, error)
 
 
 def test_sigma_is_sigma0_over_the_radius(rig: Rig) -> None:
@@ -74,7 +112,9 @@ def test_sigma_is_sigma0_over_the_radius(rig: Rig) -> None:
     sphere.data.materials[0].cdrf.sigma0 = 0.15
     normals, covered = rig.normals(sphere)
     theta = np.arccos(np.clip(normals[covered] @ towards(sun), -1.0, 1.0))
-    assert_within(rig.render()[covered][:, 0] - reflectance(theta, 0.5), WRITTEN, "sigma 0.5")
+    assert_within(
+        rig.render()[covered][:, 0] - sphere_reflectance(theta, 0.5), WRITTEN, "sigma 0.5"
+    )
 
 
 LOCAL: dict[str, Any] = {"location": (1.5, -3.0, 2.0)}
@@ -124,7 +164,7 @@ def test_each_light_type_alone_and_all_at_once(rig: Rig, kinds: list[str]) -> No
     for light in lights:
         value, direction = irradiance_over_pi(light, points, threshold)
         cosine = np.clip((normals * direction).sum(axis=1), -1.0, 1.0)
-        expected += value * reflectance(np.arccos(cosine), 0.3)
+        expected += value * sphere_reflectance(np.arccos(cosine), 0.3)
     peak = expected.max()
     for lamp in lights:
         lamp.data.energy /= peak  # so that bounds are in units of the peak ...
