@@ -2,8 +2,9 @@
 """The measured model and the fits of sigma0: writes docs/measured.md and docs/measured.json.
 
     ./dev python tests/benchmarks/measured.py            everything, about ten minutes on two cores
-    ./dev python tests/benchmarks/measured.py --fine     also the time of the fine quality
-    ./dev python tests/benchmarks/measured.py --page     the page again, from the JSON
+    ./dev python tests/benchmarks/measured.py --only fits     one part, or several
+    ./dev python tests/benchmarks/measured.py --only          the page from the JSON
+    ./dev python tests/benchmarks/measured.py --fine          also the time of the fine quality
 
 Measurements are kept in the folder given by --cache and used again; a time is told only of those
 that were rendered in this run, and the earlier ones stay in the JSON.
@@ -13,10 +14,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +44,7 @@ TABLE_ALBEDOS = (0.5, 0.8, 0.9, 0.95, 0.99)
 # Rows of the tables that are nearest to the scales of docs by hand: 0.02 to 3.
 TABLE_SCALES = (0.022097, 0.044194, 0.088388, 0.176777, 0.5, 1.0, 2.828427)
 FRESH_SEED = 77
+TIMED_SEED = 1
 OFF_ROWS = (0.03, 0.07, 0.15, 0.33, 0.9, 1.8)
 SKIN: Albedo = (0.8, 0.5, 0.4)
 RATIO = (1.0, 0.35, 0.2)
@@ -205,6 +209,28 @@ def ratio_claim(study: Study) -> list[dict[str, Any]]:
     return found
 
 
+def fits_part(study: Study) -> dict[str, Any]:
+    """The fit table, and sigma0 against albedo."""
+    fits, sigma0 = tables(study)
+    return {"fits": fits, "sigma0": sigma0}
+
+
+def times(study: Study) -> dict[str, Any]:
+    """Render whole tables, for their time."""
+    for quality in ("preview", "default"):
+        study.get(Request(SETS[0], quality, TIMED_SEED))
+    return {}
+
+
+PARTS: dict[str, Callable[[Study], dict[str, Any]]] = {
+    "fits": fits_part,
+    "off_rows": lambda study: {"off_rows": off_rows(study)},
+    "ratio": lambda study: {"ratio": ratio_claim(study)},
+    "views": lambda study: {"views": views(study)},
+    "times": times,
+}
+
+
 def to_table(head: list[str], rows: list[list[str]]) -> list[str]:
     """Make a Markdown table."""
     return [
@@ -235,7 +261,7 @@ def page(results: dict[str, Any]) -> str:
             "gain", "RMS", "sphere σ", "RMS", "sphere σ, gain free", "gain", "RMS",
             "measured RMS", "noise"]  # fmt: skip
     rows = []
-    for row in results["fits"]:
+    for row in results.get("fits", []):
         cells = [f"{row['albedo']:g}", f"{row['scale']:.3f}", f"{row['energy']:.3f}"]
         cells.append(f"{row['lambert']:.4f}")
         for name in MODELS:
@@ -252,7 +278,7 @@ def page(results: dict[str, Any]) -> str:
             + [f"{s['sigma0_per_radius'][name]:.3f}" for name in MODELS]
             + [f"{s['proportional_to_scale'][name] or float('inf'):.3g}" for name in MODELS]
             + [f"{s['least_scale_gain']:.3f}"]
-            for s in results["sigma0"]
+            for s in results.get("sigma0", [])
         ],
     )
     lines += ["## Spheres that are in no table, another seed (noise subtracted)", ""]
@@ -262,19 +288,20 @@ def page(results: dict[str, Any]) -> str:
         [
             [f"{r['albedo']:g}", f"{r['radius']:g}", f"{r['scale']:g}", f"{r['measured']:.4f}"]
             + [f"{r[name]:.4f}" for name in (*MODELS, "lambert", "noise")]
-            for r in results["off_rows"]
+            for r in results.get("off_rows", [])
         ],
     )  # fmt: skip
-    worst = max(r["measured"] for r in results["off_rows"])
-    together = np.sqrt(np.mean([r["measured"] ** 2 for r in results["off_rows"]]))
-    lines += [f"Worst {worst:.4f}, RMS of all {together:.4f}.", ""]
+    errors = np.array([r["measured"] for r in results.get("off_rows", [])])
+    if len(errors):
+        together = math.sqrt(float((errors**2).mean()))
+        lines += [f"Worst {errors.max():.4f}, RMS of all {together:.4f}.", ""]
     lines += ["## A channel does not know of the others", ""]
     lines += to_table(
         ["albedo", "radius", "scale", "RMS of the difference", "expected from noise", "χ²"],
         [
             [f"{r['albedo']:g}", f"{r['radius']:g}", f"{r['scale']:g}", f"{r['rms']:.4f}",
              f"{r['noise']:.4f}", f"{r['chi_squared']:.2f}"]
-            for r in results["ratio"]
+            for r in results.get("ratio", [])
         ],
     )  # fmt: skip
     lines += [
@@ -290,7 +317,7 @@ def page(results: dict[str, Any]) -> str:
         [
             [f"{r['elevation']:g}°", f"{r['albedo']:g}", f"{r['scale']:g}"]
             + [f"{r[name]:.3f}" for name in ("least", "mean", "most")]
-            for r in results["views"]
+            for r in results.get("views", [])
         ],
     )
     lines += ["## Time", ""]
@@ -299,7 +326,7 @@ def page(results: dict[str, Any]) -> str:
         [
             [name, f"{quality.pixels[0]} × {quality.pixels[1]}",
              str(quality.samples * quality.passes),
-             *(f"{results['seconds'][name][kind]:.0f}" if name in results["seconds"] else ""
+             *(f"{results['seconds'][name][kind]:.0f}" if name in results.get("seconds", {}) else ""
                for kind in ("wall", "cpu"))]
             for name, quality in QUALITIES.items()
         ],
@@ -323,19 +350,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cache", type=Path, default=Path(tempfile.gettempdir()) / "cdrf_measured")
     parser.add_argument("--fine", action="store_true", help="also the time of the fine quality")
-    parser.add_argument("--page", action="store_true", help="only the page, from the JSON")
+    parser.add_argument("--only", nargs="*", choices=PARTS, default=list(PARTS))
     options = parser.parse_args()
     store = ROOT / "docs" / "measured.json"
     results = json.loads(store.read_text(encoding="utf-8")) if store.exists() else {}
-    if not options.page:
-        study = Study(options.cache)
-        fits, sigma0 = tables(study)
-        parts = {"fits": fits, "sigma0": sigma0, "off_rows": off_rows(study)}
-        parts |= {"ratio": ratio_claim(study), "views": views(study)}
-        for quality in ("preview", "default", "fine") if options.fine else ("preview", "default"):
-            study.get(Request(SETS[0], quality, 1))
-        seconds = results.get("seconds", {}) | study.seconds
-        results = rounded({"machine": machine(), **parts, "seconds": seconds})
+    study = Study(options.cache)
+    for part in options.only:
+        results |= {"machine": machine(), **PARTS[part](study)}
+        if part == "times" and options.fine:
+            study.get(Request(SETS[0], "fine", TIMED_SEED))
+        results["seconds"] = results.get("seconds", {}) | study.seconds
+        results = rounded(results)
         store.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     (ROOT / "docs" / "measured.md").write_text(page(results), encoding="utf-8")
     sys.stdout.flush()
