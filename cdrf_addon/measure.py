@@ -21,6 +21,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from .compat import walk_method
 from .core.errors import MeasurementError
 from .core.measurement import SphereMeasurement, bin_pixels, load, pool, save
 from .core.progress import run_steps
@@ -94,7 +95,7 @@ class Request:
         """Fill in the rows of a table where no scales are given."""
         if self.scales:
             return self
-        old = self.method == "RANDOM_WALK_LEGACY" or bpy.app.version < (5, 0, 0)
+        old = walk_method(self.method) == "RANDOM_WALK_LEGACY"
         first = FIRST_SCALE * (OLD_REACH if old else 1.0)
         rows = tuple(first * 2.0 ** (row / ROWS_PER_OCTAVE) for row in range(ROWS))
         return replace(self, scales=rows)

@@ -23,6 +23,7 @@ from .blender.fit_picture import make_picture, picture_path, show_picture
 from .blender.image import ensure_table
 from .blender.materials import active_skin, cdrf_node
 from .blender.read_material import Scattering, read_scattering
+from .compat import walk_method
 from .core.errors import CdrfError, ParameterError, SceneError
 from .core.material_fit import MaterialFit, fit_material
 from .core.measured import MeasuredModel
@@ -216,7 +217,7 @@ def own_scattering(skin: bpy.types.Material) -> Scattering:
     red, green, blue, _ = node.inputs[ids.BASE_COLOR].default_value
     albedo = (red, green, blue)
     sigma0 = reflectance_models.channel_sigma0(skin)
-    factors = sigma0_per_radius(albedo)
+    factors = sigma0_per_radius(albedo, walk_method(RANDOM_WALK))
     radius = [float(own / factor) for own, factor in zip(sigma0, factors, strict=True)]
     return Scattering(albedo, (radius[0], radius[1], radius[2]), RANDOM_WALK, 1.0)
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import bpy
 
 from .. import ids
+from ..compat import walk_method
 from ..core.errors import ParameterError, SceneError
 from ..core.models import (
     DEFAULT_KIND,
@@ -112,7 +113,7 @@ def has_colour(material: bpy.types.Material) -> bool:
 
 def set_scattering(material: bpy.types.Material, found: Scattering) -> None:
     """Take the scatter distances from what a Principled or Subsurface node says."""
-    factors = sigma0_per_radius(found.albedo, found.method)
+    factors = sigma0_per_radius(found.albedo, walk_method(found.method))
     sigma0 = [radius * float(factor) for radius, factor in zip(found.radius, factors, strict=True)]
     set_channel_sigma0(material, sigma0)
 
