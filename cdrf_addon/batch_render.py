@@ -33,11 +33,13 @@ if not __package__:  # run as a file: make the package importable, then go on in
 import bpy
 
 from cdrf_addon import compat, register, unregister
-from cdrf_addon.blender import display, legend, setup, stage
+from cdrf_addon.blender import display, legend, reflectance_models, setup, stage
 from cdrf_addon.blender.materials import cdrf_node
 from cdrf_addon.core.curvature import Options
 from cdrf_addon.core.errors import CdrfError, ParameterError, SceneError
 from cdrf_addon.core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
+from cdrf_addon.core.models import MODEL_ITEMS
+from cdrf_addon.core.presets import PRESETS
 from cdrf_addon.core.progress import in_words
 
 VERSION = 1
@@ -177,6 +179,10 @@ def make_parser() -> argparse.ArgumentParser:
         help="scatter distances in world units, a picture each (default: the file's)")  # fmt: skip
     add("--ratio", type=_factor, nargs=3, metavar=("R", "G", "B"),
         help="scatter distance of red, green, blue as factors of sigma0")  # fmt: skip
+    add("--model", choices=[item[0] for item in MODEL_ITEMS],
+        help="model of reflectance (default: the file's; SPHERE for mesh files)")  # fmt: skip
+    add("--preset", choices=list(PRESETS), metavar="NAME",
+        help=f"scatter distance of a real material: {', '.join(PRESETS)}")  # fmt: skip
     add("--albedo", type=_factor, nargs=3, metavar=("R", "G", "B"),
         help="base colour of mesh files, linear")  # fmt: skip
     add("--frames", type=parse_frames, help="7, 1-5, 1-9:2 or 1,4,8 (default: the current one)")
@@ -319,9 +325,15 @@ def _adjust(
     if display.shows_curvature(material):
         record.warnings.append(f"'{material.name}' was showing its curvature; skin is rendered.")
         display.hide([material])
+    if options.preset:
+        metres = reflectance_models.metres_of(bpy.context.scene)
+        reflectance_models.apply_preset(material, PRESETS[options.preset], metres, 1.0)
+    if options.model:
+        reflectance_models.set_kind(material, options.model)
     if options.ratio:
         material.cdrf.sigma0_ratio = options.ratio
-    if options.sigma0 and _free(material, node.inputs["Sigma0"]):
+    given = options.sigma0 or options.preset
+    if given and _free(material, node.inputs["Sigma0"]):
         record.warnings.append(
             f"'{material.name}': Sigma0 is animated or connected; the command line replaces that."
         )

@@ -8,9 +8,10 @@ import textwrap
 import bpy
 
 from . import ids
-from .blender import display, materials, shader, state
+from .blender import display, materials, reflectance_models, shader, state
 from .compat import EEVEE
 from .core.estimators import METHODS
+from .core.models import MODEL_ITEMS, PROFILE
 from .core.summary import CONSTANT, FLAT, VARYING
 
 _MOST_LINES = 6
@@ -24,14 +25,6 @@ def _wrapped(layout: bpy.types.UILayout, text: str, width: int, icon: str = "NON
 def _characters(context: bpy.types.Context) -> int:
     scale = context.preferences.system.ui_scale
     return int((context.region.width - 60.0 * scale) / (7.0 * scale))
-
-
-def _active_skin(item: bpy.types.Object | None) -> bpy.types.Material | None:
-    """Return the translucent material to show: the active slot's, or the first there is."""
-    if item is None or item.type != "MESH":
-        return None
-    skins = [s.material for s in item.material_slots if materials.cdrf_node(s.material)]
-    return item.active_material if item.active_material in skins else next(iter(skins), None)
 
 
 def draw_skin(
@@ -59,6 +52,26 @@ def draw_skin(
     layout.label(text=f"{lookups} look-up{plural} for {len(wired)} light(s)", icon="TEXTURE")
     if not material.is_editable:
         _wrapped(layout, "Linked: make it local to change it.", _characters(context), "LINKED")
+
+
+def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None:
+    """Draw the choice of model, and of scatter distances that others have measured."""
+    kind = reflectance_models.kind_of_model(material)
+    name = next(item[1] for item in MODEL_ITEMS if item[0] == kind)
+    row = layout.row(align=True)
+    row.operator_menu_enum("cdrf.set_model", "model", text=name, icon="SHADING_TEXTURE")
+    row.operator_menu_enum("cdrf.preset", "preset", text="Preset", icon="PRESET")
+    row.operator("cdrf.read_shader", text="", icon="EYEDROPPER")
+    row = layout.row(align=True)
+    row.operator("cdrf.measure", icon="RENDER_STILL")
+    row.operator("cdrf.fit", icon="GRAPH")
+    if kind == PROFILE:
+        column = layout.column()
+        column.prop(material.cdrf, "profile", text="")
+        column.prop(material.cdrf, "profile_base", expand=False)
+        problem = reflectance_models.profile_problem(material)
+        if problem:
+            column.label(text=problem, icon="ERROR")
 
 
 def draw_display(
@@ -135,7 +148,7 @@ class CDRF_PT_main(_View3D, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         item = context.active_object
-        skin = _active_skin(item)
+        skin = materials.active_skin(item)
         row = layout.row()
         row.scale_y = 1.5
         row.operator("cdrf.setup", icon="SHADING_RENDERED")
@@ -151,6 +164,7 @@ class CDRF_PT_main(_View3D, bpy.types.Panel):
             layout.prop(context.scene.render, "engine", text="Render Engine")
         layout.label(text=skin.name, icon="MATERIAL")
         draw_skin(layout, context, skin)
+        draw_model(layout, skin)
         draw_display(layout, context, skin)
         draw_state(layout, context, item)
 
@@ -176,6 +190,7 @@ class CDRF_PT_material(bpy.types.Panel):
             button.only_active_slot = button.only_active_object = True
             return
         draw_skin(layout, context, material)
+        draw_model(layout, material)
         draw_state(layout, context, context.object)
 
 

@@ -22,33 +22,10 @@ from .blender.materials import cdrf_node
 from .core.errors import CdrfError
 from .core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
 from .core.mesh import NO_CREASE
-from .core.models import MEASURED, PROFILE, RING, SKIN_PROFILE, SPHERE
+from .core.models import MODEL_ITEMS, PROFILE, RING, SKIN_PROFILE, SPHERE
 from .core.summary import CONSTANT, FLAT, VARYING
 
 UNSET = -1.0
-MODEL_ITEMS = [
-    (
-        SPHERE,
-        "Sphere",
-        "Light spreads as heat does on a sphere, and none is lost. Closest to path tracing on "
-        "heads and figures; the default",
-    ),
-    (
-        RING,
-        "Ring (Kubo 2011)",
-        "The paper's own: light spreads along a circle. Bleeds more; brighter at large distances",
-    ),
-    (
-        PROFILE,
-        "Profile",
-        "A sum of Gaussians for each colour, as of layered skin. One look-up for all colours",
-    ),
-    (
-        MEASURED,
-        "Measured",
-        "What Cycles shows on spheres of this very material. Press Measure first",
-    ),
-]
 SIGMA0_MAX = 1e6
 RATIO_MAX = 1e3
 

@@ -33,6 +33,14 @@ def cdrf_node(material: bpy.types.Material | None) -> bpy.types.ShaderNode | Non
     return None
 
 
+def active_skin(item: bpy.types.Object | None) -> bpy.types.Material | None:
+    """Return the translucent material that panels show: the active slot's, or the first."""
+    if item is None or item.type != "MESH":
+        return None
+    skins = [slot.material for slot in item.material_slots if cdrf_node(slot.material)]
+    return item.active_material if item.active_material in skins else next(iter(skins), None)
+
+
 def require_editable(data: bpy.types.ID) -> None:
     """Refuse data that cannot be changed in this file.
 

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import bpy
 
 from .. import ids
-from ..core.errors import SceneError
+from ..core.errors import ParameterError, SceneError
 from ..core.models import (
     DEFAULT_KIND,
     MEASURED,
@@ -26,10 +26,13 @@ from ..core.models import (
     ring,
     sphere,
 )
+from ..core.presets import Preset, in_units
+from ..core.scattering import sigma0_per_radius
 from . import shader
 from .image import ensure_table, find_table, table_of
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
+from .read_material import Scattering
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -53,6 +56,15 @@ def model_of_kind(material: bpy.types.Material, kind: str) -> Model | None:
     if kind == PROFILE:
         return profile(parse_profile(settings.profile, settings.profile_base))
     return ring() if kind == RING else sphere()
+
+
+def profile_problem(material: bpy.types.Material) -> str:
+    """Say what is wrong with the text of a material's profile; empty if nothing is."""
+    try:
+        parse_profile(material.cdrf.profile)
+    except ParameterError as error:
+        return str(error)
+    return ""
 
 
 def set_kind(material: bpy.types.Material, kind: str) -> None:
@@ -91,6 +103,60 @@ def set_model(material: bpy.types.Material, key: str) -> None:
         ratio = tuple(r * math.sqrt(m) for r, m in zip(ratio, before.moments, strict=True))
     change_variant(material, ratio, key)
     settings.sigma0_ratio = ratio
+
+
+def has_colour(material: bpy.types.Material) -> bool:
+    """Tell whether the material's model has a table of its own for each channel."""
+    return table_of(ensure_chosen(material)).colour
+
+
+def set_scattering(material: bpy.types.Material, found: Scattering) -> None:
+    """Take the scatter distances from what a Principled or Subsurface node says."""
+    factors = sigma0_per_radius(found.albedo, found.method)
+    sigma0 = [radius * float(factor) for radius, factor in zip(found.radius, factors, strict=True)]
+    set_channel_sigma0(material, sigma0)
+
+
+def channel_sigma0(material: bpy.types.Material) -> list[float]:
+    """Scatter distance of red, green and blue, whatever model the material has."""
+    moments = table_of(ensure_chosen(material)).moments
+    settings = material.cdrf
+    return [
+        settings.sigma0 * ratio * math.sqrt(moment)
+        for ratio, moment in zip(settings.sigma0_ratio, moments, strict=True)
+    ]
+
+
+def set_channel_sigma0(material: bpy.types.Material, sigma0: Sequence[float]) -> None:
+    """Set the scatter distance of each channel, for a model without colour."""
+    largest = max(sigma0)
+    material.cdrf.sigma0 = largest
+    material.cdrf.sigma0_ratio = [value / largest if largest > 0.0 else 1.0 for value in sigma0]
+
+
+def metres_of(scene: bpy.types.Scene) -> float:
+    """Metres in a unit of the scene; 1 where it has no units, as elsewhere in Blender."""
+    units = scene.unit_settings
+    return 1.0 if units.system == "NONE" else float(units.scale_length)
+
+
+def apply_preset(material: bpy.types.Material, preset: Preset, metres: float, size: float) -> None:
+    """Give a material the model and scatter distances of a preset.
+
+    Args:
+        material: Any editable material.
+        preset: In millimetres.
+        metres: In a unit of the scene.
+        size: Size of the object in the scene over its real size.
+
+    Raises:
+        SceneError: The material is linked.
+    """
+    sigma0, ratio = in_units(preset.sigma0, metres, size)
+    set_kind(material, preset.model)
+    material.cdrf.sigma0 = sigma0
+    # A profile has its channels' widths in its table.
+    material.cdrf.sigma0_ratio = (1.0, 1.0, 1.0) if preset.model == PROFILE else ratio
 
 
 def ensure_chosen(material: bpy.types.Material) -> str:

@@ -51,6 +51,7 @@ from .mesh_io import (
     to_original_vertices,
     write_curvature,
 )
+from .read_material import read_scattering
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -72,6 +73,8 @@ class Report:
     computed: int = 0
     seconds: float = 0.0
     warnings: list[str] = field(default_factory=list)
+    read: list[str] = field(default_factory=list)
+    """Materials whose scatter distance was read from their own shader nodes."""
 
     def sentence(self) -> str:
         """Sum it up in one line."""
@@ -81,6 +84,8 @@ class Report:
             parts.append(f"curvature at {self.vertices:,} vertices in {self.seconds:.2f} s")
         else:
             parts.append("curvature was up to date")
+        if self.read:
+            parts.append(f"scatter distance of {', '.join(self.read)} taken from its nodes")
         return ", ".join(parts)
 
 
@@ -415,7 +420,12 @@ class Setup:
         work = self._work_of(material)
         if fresh:
             node.inputs[ids.SIGMA0_RATIO].default_value = ratio
-            if settings.chosen_sigma0 < 0.0:
+            own = read_scattering(material) if settings.chosen_sigma0 < 0.0 else None
+            if own is not None:
+                reflectance_models.set_scattering(material, own)
+                self.report.read.append(material.name)
+                self.report.warnings += [f"'{material.name}': {note}" for note in own.notes]
+            elif settings.chosen_sigma0 < 0.0:
                 settings.chosen_sigma0 = _first_sigma0(work)
             node.inputs[ids.SIGMA0].default_value = settings.chosen_sigma0
         if source == shader.CONSTANT:

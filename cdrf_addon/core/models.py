@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .arguments import checked
+from .energy import conserving
 from .errors import ParameterError
 from .heat_kernel import sphere_reflectance
 from .reflectance import reflectance
@@ -29,10 +30,36 @@ from .reflectance import reflectance
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from .measurement import SphereMeasurement
+
     Evaluate = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
 RING, SPHERE, PROFILE, MEASURED = "RING", "SPHERE", "PROFILE", "MEASURED"
 DEFAULT_KIND = SPHERE
+MODEL_ITEMS = (
+    (
+        SPHERE,
+        "Sphere",
+        "Light spreads as heat does on a sphere, and none is lost. Closest to path tracing on "
+        "heads and figures; the default",
+    ),
+    (
+        RING,
+        "Ring (Kubo 2011)",
+        "The paper's own: light spreads along a circle. Bleeds more; brighter at large distances",
+    ),
+    (
+        PROFILE,
+        "Profile",
+        "A sum of Gaussians for each colour, as of layered skin. One look-up for all colours",
+    ),
+    (
+        MEASURED,
+        "Measured",
+        "What Cycles shows on spheres of this very material. Press Measure first",
+    ),
+)
+"""Kind, name and tooltip of each model."""
 MOST_GAUSSIANS = 64
 # The channels' weights may miss 1 by this much before they are taken for a mistake.
 WEIGHT_TOLERANCE = 0.02
@@ -119,7 +146,7 @@ class Profile:
     def to_text(self) -> str:
         """One line a Gaussian: width, then red, green and blue."""
         return "; ".join(
-            f"{width:.12g} " + " ".join(f"{part:.12g}" for part in parts)
+            f"{width:.7g} " + " ".join(f"{part:.7g}" for part in parts)
             for width, parts in zip(self.widths, self.weights, strict=True)
         )
 
@@ -186,6 +213,37 @@ def profile(shape: Profile = SKIN_PROFILE) -> Model:
     key = f"{PROFILE} {_hash(shape.base, shape.to_text())}"
     red, green, blue = (float(moment) for moment in moments)
     return Model(PROFILE, key, evaluate, True, (red, green, blue))
+
+
+def measured_model(
+    spheres: SphereMeasurement, radius: tuple[float, float, float], *, keep_energy: bool
+) -> tuple[Model, float]:
+    """What was measured on path-traced spheres, for channels of these scatter radii.
+
+    Args:
+        spheres: The measurement.
+        radius: Of red, green and blue, in any unit.
+        keep_energy: Divide by what a sphere gains over Lambert (core/energy.py): closer on bodies
+            that are not spheres, and no longer exact on those that are.
+
+    Returns:
+        The model, and the sigma0 that belongs to it, in the unit of the radii.
+    """
+    from .material_fit import sigma_per_scale
+    from .measured import MeasuredModel
+
+    slopes = [sigma_per_scale(spheres, channel) for channel in range(3)]
+    widest = int(np.argmax(radius))
+    table = MeasuredModel(spheres, radius, slopes[widest])
+    red, green, blue = (
+        float(ratio * slope / slopes[widest]) ** 2
+        for ratio, slope in zip(table.ratio, slopes, strict=True)
+    )
+    facts = [spheres.blender, spheres.method, spheres.seed, spheres.samples, keep_energy]
+    numbers = [float(number) for number in (*spheres.albedo, *table.ratio)]
+    key = f"{MEASURED} {_hash(str(facts), str(numbers))}"
+    evaluate = conserving(table.evaluate) if keep_energy else table.evaluate
+    return Model(MEASURED, key, evaluate, True, (red, green, blue)), max(radius) * slopes[widest]
 
 
 def _hash(*parts: str) -> str:
