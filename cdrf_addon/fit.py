@@ -29,6 +29,8 @@ import bpy
 import numpy as np
 
 from cdrf_addon.blender.fit_figure import draw_fit
+from cdrf_addon.blender.read_material import read_scattering
+from cdrf_addon.blender.reflectance_models import metres_of
 from cdrf_addon.core.errors import CdrfError, MeasurementError
 from cdrf_addon.core.fitting import MODELS
 from cdrf_addon.core.material_fit import CHANNELS, EQUATOR, WEIGHTINGS, MaterialFit, fit_material
@@ -46,6 +48,7 @@ from cdrf_addon.measure import (
 
 FORMAT = 1
 PROGRESS_SECONDS = 2.0
+LEAST_ALBEDO = 1e-3
 METHODS = ("RANDOM_WALK", "RANDOM_WALK_LEGACY", "RANDOM_WALK_SKIN")
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 EXAMPLES = """\
@@ -59,6 +62,7 @@ what the numbers are:
   --color is the base colour, linear, 0 to 1: how much light comes back in each channel.
   --radius is the subsurface radius of each channel, --scale the factor on all three.
   sigma0 in fit.json is what the extension's slider wants: a distance in metres, per channel.
+  --blend and --material read all of them from a Principled or Subsurface Scattering node.
   Measurements are kept and used again; --no-cache measures anew.
 """
 
@@ -100,6 +104,8 @@ def make_parser() -> argparse.ArgumentParser:
         help="base colour, linear (default: 0.8 0.8 0.8)")  # fmt: skip
     add("--radius", type=_positive, nargs=3, metavar=rgb, default=[1.0, 0.2, 0.1],
         help="subsurface radius of each channel (default: 1 0.2 0.1)")  # fmt: skip
+    add("--blend", type=Path, help="read colour, radius and scale from a material in this file")
+    add("--material", help="its name (default: the only material there that scatters)")
     add("--scale", type=_positive, default=0.05, help="factor on the radii (default: 0.05)")
     add("--unit", choices=list(UNITS), default="m", help="of radius times scale (default: m)")
     add("--method", choices=METHODS, default=RANDOM_WALK,
@@ -199,6 +205,52 @@ def results(
     }
 
 
+def error_table(model: MeasuredModel, fit: MaterialFit) -> list[str]:
+    """RMS of Lambert and every model side by side, gain 1, on spheres of some sizes."""
+    theta = model.measurement.theta
+    weights = WEIGHTINGS[fit.weighting](theta)
+    lines = [f"{'RMS, gain 1':>24}" + "".join(f"{n:>10}" for n in ("Lambert", *MODELS, "measured"))]
+    for number, (name, channel) in enumerate(zip(CHANNELS, fit.channels, strict=True)):
+        for row in range(2, len(fit.scales), 4):
+            off = model.curves[row][number](theta) - model.measurement.values[row, number]
+            errors = [channel.lambert[row], *(channel.fixed[m][row].rms for m in MODELS)]
+            errors.append(math.sqrt(float((off**2) @ weights)))
+            size = f"{name}, r = {1.0 / fit.scales[row]:.3g} radii"
+            lines.append(f"{size:>24}" + "".join(f"{error:10.4f}" for error in errors))
+    return lines
+
+
+def read_file(options: argparse.Namespace) -> None:
+    """Fill colour, radius, scale and method in from a material of a .blend.
+
+    Raises:
+        MeasurementError: The file cannot be opened, or no such material scatters.
+    """
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(options.blend.resolve()), load_ui=False)
+    except RuntimeError as error:
+        raise MeasurementError(f"{options.blend} cannot be opened: {str(error).strip()}") from error
+    found = {item.name: read_scattering(item) for item in bpy.data.materials}
+    scatters = {name: item for name, item in found.items() if item is not None}
+    name = options.material or (next(iter(scatters)) if len(scatters) == 1 else "")
+    if name not in scatters:
+        there = ", ".join(scatters) or "none"
+        raise MeasurementError(
+            f"{'No material is chosen' if not name else f'{name!r} does not scatter'}; materials "
+            f"with subsurface scattering in {options.blend.name}: {there}. Choose by --material."
+        )
+    material = scatters[name]
+    for note in material.notes:
+        say(f"{name}: {note}")
+    options.color = [min(max(part, LEAST_ALBEDO), 1.0) for part in material.albedo]
+    metres = metres_of(bpy.context.scene)
+    options.radius, options.scale, options.unit = [r * metres for r in material.radius], 1.0, "m"
+    if material.method in METHODS:
+        options.method = material.method
+    else:
+        say(f"{name}: {material.method} is measured as {options.method}, which CDRF is made for.")
+
+
 def run(options: argparse.Namespace) -> None:
     """Measure, fit, and write the three files.
 
@@ -207,6 +259,8 @@ def run(options: argparse.Namespace) -> None:
         OSError: A file cannot be written.
     """
     start = time.perf_counter()
+    if options.blend is not None:
+        read_file(options)
     out: Path = options.output
     out.mkdir(parents=True, exist_ok=True)
     colour = (options.color[0], options.color[1], options.color[2])
@@ -220,7 +274,7 @@ def run(options: argparse.Namespace) -> None:
     part = out / "fit.json.part"
     part.write_text(json.dumps(results(options, model, fit, seconds), indent=1) + "\n", "utf-8")
     part.replace(out / "fit.json")
-    for line in fit.sentences():
+    for line in (*fit.sentences(), *error_table(model, fit)):
         say(line)
     radii = np.array(options.radius) * options.scale * UNITS[options.unit] * 1e3
     for name in MODELS:
@@ -235,7 +289,7 @@ def main(argv: list[str] | None = None) -> int:
     parser = make_parser()
     try:
         options = parser.parse_args(own_arguments(sys.argv) if argv is None else argv)
-        if max(options.radius) * options.scale <= 0.0:
+        if options.blend is None and max(options.radius) * options.scale <= 0.0:
             raise MeasurementError("radius times scale is 0: nothing scatters, nothing to measure.")
     except MeasurementError as error:
         say(f"fit: {error}")

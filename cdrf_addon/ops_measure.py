@@ -10,27 +10,35 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
+from bpy.props import EnumProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from . import ids
 from .blender import reflectance_models
 from .blender.fit_picture import make_picture, picture_path, show_picture
 from .blender.image import ensure_table
 from .blender.materials import active_skin, cdrf_node
-from .blender.read_material import read_scattering
+from .blender.read_material import Scattering, read_scattering
 from .core.errors import CdrfError, ParameterError, SceneError
 from .core.material_fit import MaterialFit, fit_material
 from .core.measured import MeasuredModel
 from .core.measurement import SphereMeasurement
 from .core.models import RING, SPHERE, measured_model
 from .core.progress import in_words, run_steps
-from .core.scattering import sigma0_per_radius
+from .core.scattering import BURLEY, sigma0_per_radius
 from .core.summary import CONSTANT
-from .measure import DEFAULT_QUALITY, POLL_SECONDS, Request, cache_folder, measure_steps
+from .measure import (
+    DEFAULT_QUALITY,
+    POLL_SECONDS,
+    RANDOM_WALK,
+    Request,
+    cache_folder,
+    measure_steps,
+)
 
 Colour = tuple[float, float, float]
 TICK_SECONDS = 0.1
@@ -90,6 +98,8 @@ class _PathTraced(bpy.types.Operator):
         max=2**31 - 1,
     )
 
+    method: StringProperty(default=RANDOM_WALK, options={"HIDDEN", "SKIP_SAVE"})
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         skin = active_skin(context.object)
@@ -104,7 +114,8 @@ class _PathTraced(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         skin = active_skin(context.object)
         assert skin is not None
-        self.albedo, self.radius = own_scattering(skin)
+        own = own_scattering(skin)
+        self.albedo, self.radius, self.method = own.albedo, own.radius, own.method
         return context.window_manager.invoke_props_dialog(self, width=360)
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -172,7 +183,7 @@ class _PathTraced(bpy.types.Operator):
         if not max(self.radius) > 0.0:
             raise ParameterError("Every scatter radius is 0, so nothing scatters: enter one.")
         red, green, blue = (max(float(part), LEAST_ALBEDO) for part in self.albedo)
-        return Request((red, green, blue), self.quality, self.seed)
+        return Request((red, green, blue), self.quality, self.seed, method=self.method)
 
     def _material(self) -> bpy.types.Material:
         """Return the material the work began with, which may have gone meanwhile."""
@@ -194,11 +205,12 @@ class _PathTraced(bpy.types.Operator):
         raise NotImplementedError
 
 
-def own_scattering(skin: bpy.types.Material) -> tuple[Colour, Colour]:
-    """Albedo and scatter radius of a material: from its nodes, else from its scatter distance."""
+def own_scattering(skin: bpy.types.Material) -> Scattering:
+    """Read a material's scattering from its nodes, else work it out from its scatter distance."""
     found = read_scattering(skin)
     if found is not None:
-        return found.albedo, found.radius
+        # Burley's profile is no path tracing: what it stands for is a random walk.
+        return replace(found, method=RANDOM_WALK) if found.method == BURLEY else found
     node = cdrf_node(skin)
     assert node is not None
     red, green, blue, _ = node.inputs[ids.BASE_COLOR].default_value
@@ -206,7 +218,7 @@ def own_scattering(skin: bpy.types.Material) -> tuple[Colour, Colour]:
     sigma0 = reflectance_models.channel_sigma0(skin)
     factors = sigma0_per_radius(albedo)
     radius = [float(own / factor) for own, factor in zip(sigma0, factors, strict=True)]
-    return albedo, (radius[0], radius[1], radius[2])
+    return Scattering(albedo, (radius[0], radius[1], radius[2]), RANDOM_WALK, 1.0)
 
 
 def _smooth_and_fit(

@@ -135,7 +135,7 @@ def _curves(
     below = Axes(
         picture, (left, RESIDUALS[0], right, RESIDUALS[1]), (0.0, 180.0), (-reach, reach), SIZE
     )
-    below.grid(DEGREES, steps(-reach, reach, 4), "angle between normal and light, θ",
+    below.grid(DEGREES, steps(-reach, reach, 6), "angle between normal and light, θ",
                "model - data")  # fmt: skip
     for _, colour, kind, curve, at in shown:
         axes.curve(degrees, curve, colour, 2.2, () if kind else DASH)

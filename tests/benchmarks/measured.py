@@ -2,6 +2,7 @@
 """The measured model and the fits of sigma0: writes docs/measured.md and docs/measured.json.
 
     ./dev python tests/benchmarks/measured.py            everything, about ten minutes on two cores
+    ./dev python tests/benchmarks/measured.py --fine     also the time of the fine quality
     ./dev python tests/benchmarks/measured.py --page     the page again, from the JSON
 
 Measurements are kept in the folder given by --cache and used again; a time is told only of those
@@ -183,10 +184,10 @@ def views(study: Study) -> list[dict[str, Any]]:
 def ratio_claim(study: Study) -> list[dict[str, Any]]:
     """A channel of a coloured radius against the same channel of equal radii, direct."""
     scale = 0.4
-    together = study.get(Request(SKIN, "fine", 31, (0.2, scale), RATIO))
+    together = study.get(Request(SKIN, "default", 31, (0.2, scale), RATIO))
     found = []
     for channel, radius in enumerate(RATIO):
-        alone = study.get(Request(SKIN, "fine", 32, tuple(radius * s for s in (0.2, scale))))
+        alone = study.get(Request(SKIN, "default", 32, tuple(radius * s for s in (0.2, scale))))
         for row in (0, 1):
             difference = together.values[row, channel] - alone.values[row, channel]
             errors = np.hypot(together.errors[row, channel], alone.errors[row, channel])
@@ -321,6 +322,7 @@ def main() -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cache", type=Path, default=Path(tempfile.gettempdir()) / "cdrf_measured")
+    parser.add_argument("--fine", action="store_true", help="also the time of the fine quality")
     parser.add_argument("--page", action="store_true", help="only the page, from the JSON")
     options = parser.parse_args()
     store = ROOT / "docs" / "measured.json"
@@ -330,7 +332,7 @@ def main() -> None:
         fits, sigma0 = tables(study)
         parts = {"fits": fits, "sigma0": sigma0, "off_rows": off_rows(study)}
         parts |= {"ratio": ratio_claim(study), "views": views(study)}
-        for quality in QUALITIES:
+        for quality in ("preview", "default", "fine") if options.fine else ("preview", "default"):
             study.get(Request(SETS[0], quality, 1))
         seconds = results.get("seconds", {}) | study.seconds
         results = rounded({"machine": machine(), **parts, "seconds": seconds})
