@@ -41,7 +41,7 @@ class LutLayout:
     """
 
     width: int = 192
-    height: int = 160
+    height: int = 192
 
     def __post_init__(self) -> None:
         if self.width < 4 * SEAM_TEXELS or self.height < 2:

@@ -20,12 +20,14 @@ from cdrf_addon.core.models import PROFILE, RING, SPHERE, Model, profile, ring, 
 
 pytestmark = pytest.mark.smoke
 
-# Issue 2 allows the shader 1e-4 before the film rounds; the table is all of that. The ring's worst
-# is at the terminator and small sigma, the sphere's where the light is overhead and sigma 0.4; of
-# the skin's Gaussians only some are at their worst at once.
-WORST = {RING: 8.5e-5, SPHERE: 8.5e-5, PROFILE: 7e-5}
+# Issue 2 allows the shader 1e-4 before the film rounds; the table is all of that. Ring and sphere
+# are at their worst between texels near the terminator at sigma 0.04; of the skin's Gaussians only
+# some are at once.
+WORST = {RING: 7.5e-5, SPHERE: 7.5e-5, PROFILE: 6.5e-5}
 # The points below crowd where the error is largest.
-RMS = {RING: 2.5e-5, SPHERE: 2.5e-5, PROFILE: 2e-5}
+RMS = {RING: 2e-5, SPHERE: 2e-5, PROFILE: 2e-5}
+# A sphere lit from the camera, the worst of all sigma: what tests/support/tolerances.py allows.
+ON_A_SPHERE = 3e-5
 # From SIGMA_MAX on the table holds its last row: the ring is within exp(-12.5) / 2 = 1.87e-6 of its
 # limit there, the sphere within exp(-25) / 2; float32 adds 3e-8.
 BEYOND = {RING: 2e-6, SPHERE: 4e-8}
@@ -142,6 +144,14 @@ def test_the_filtered_table_is_the_model(model: Model, table: np.ndarray) -> Non
     assert beyond.sum() >= 20_000
     edge = sample_lut(table, cosine[beyond], np.full(beyond.sum(), SIGMA_MAX**2))
     assert np.array_equal(sample_lut(table, cosine[beyond], sigma[beyond] ** 2), edge)
+
+
+def test_no_sigma_is_too_far_off_on_a_sphere(model: Model, table: np.ndarray) -> None:
+    # Lit from the camera, a sphere shows the cosine c on an area in proportion to c dc.
+    cosine = np.sqrt((np.arange(1_500) + 0.5) / 1_500)
+    sigma = np.geomspace(1e-3, SIGMA_MAX, 300)[:, None]
+    error = sample_lut(table, cosine, sigma**2) - model.evaluate(np.arccos(cosine), sigma)
+    assert np.sqrt((error**2).mean(axis=1)).max() <= ON_A_SPHERE
 
 
 @pytest.mark.parametrize("model", [RING, SPHERE], indirect=True)

@@ -45,8 +45,8 @@ TOLERANCE = {
     "moments": 1e-4,
     # Rounding of a weighted sum.
     "bounds": 1e-15,
-    # Widths and parts are written with twelve digits.
-    "text": 1e-11,
+    # Widths and parts are written with seven digits.
+    "text": 5e-7,
 }
 
 WHITE = (1.0, 1.0, 1.0)
