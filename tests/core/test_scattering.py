@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sigma0 from Blender's radius: against Burley's profile, Jensen's dipole and the measured table."""
+"""Sigma0 from Blender's radius: against Burley's profile, Jensen's dipole and the study."""
 
 import json
 import math
