@@ -25,7 +25,7 @@ from .blender.materials import active_skin, cdrf_node
 from .blender.read_material import Scattering, read_scattering
 from .compat import walk_method
 from .core.errors import CdrfError, ParameterError, SceneError
-from .core.material_fit import MaterialFit, fit_material
+from .core.material_fit import MaterialFit, fit_material, sigma0_at
 from .core.measured import MeasuredModel
 from .core.measurement import SphereMeasurement
 from .core.models import RING, SPHERE, measured_model
@@ -74,12 +74,12 @@ class _PathTraced(bpy.types.Operator):
         max=1.0,
     )
     radius: FloatVectorProperty(
-        name="Scatter Radius",
+        name="Scatter Radius R, G, B",
         description=(
             "Radius times Scale of Blender's subsurface scattering, for red, green and blue, taken "
             "from the material's nodes; without such nodes from its scatter distance"
         ),
-        subtype="XYZ_LENGTH",
+        unit="LENGTH",
         size=3,
         default=(0.01, 0.01, 0.01),
         min=0.0,
@@ -297,18 +297,15 @@ class CDRF_OT_fit(_PathTraced):
         if reflectance_models.has_colour(skin):
             reflectance_models.set_kind(skin, SPHERE)
         name = "ring" if reflectance_models.kind_of_model(skin) == RING else "sphere"
-        sigma0 = [
-            radius * channel.sigma0[name]
-            for radius, channel in zip(self.radius, fitted.channels, strict=True)
-        ]
-        reflectance_models.set_channel_sigma0(skin, sigma0)
+        # Right at the object's middle curvature; that sphere is shown, too.
+        kappa = context.object.data.cdrf.median if context.object else 0.0
+        reflectance_models.set_channel_sigma0(skin, sigma0_at(fitted, name, self.radius, kappa))
         for sentence in fitted.sentences():
             self.report({"INFO"}, sentence)
-        # Of the spheres, the one that is curved as the middle of this object is.
-        scale = max(self.radius) * context.object.data.cdrf.median if context.object else 0.0
+        scale = max(self.radius) * kappa or MIDDLE_SCALE
         try:
             path = picture_path(skin, cache_folder())
-            make_picture(model, fitted, scale or MIDDLE_SCALE, path)
+            make_picture(model, fitted, scale, path)
         except OSError as error:
             self.report({"WARNING"}, f"The picture could not be written: {error.strerror}.")
             return {"FINISHED"}

@@ -51,3 +51,7 @@ def show_picture(context: bpy.types.Context) -> None:
         area = opened[0].screen.areas[0]
         area.type = "IMAGE_EDITOR"
     area.spaces.active.image = image
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    window = next(w for w in context.window_manager.windows if area in w.screen.areas[:])
+    with context.temp_override(window=window, area=area, region=region):
+        bpy.ops.image.view_all(fit_view=True)

@@ -9,6 +9,8 @@ the fits with a free gain. It is in units of the scatter radius (radius * scale 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -81,6 +83,31 @@ class MaterialFit:
                     f"{PROPORTIONAL_WITHIN:.0%} {where}."
                 )
         return lines
+
+
+def sigma0_at(
+    fit: MaterialFit, model: str, radius: Sequence[float], kappa: float
+) -> tuple[float, float, float]:
+    """Return sigma0 of each channel for which sigma0 * kappa is the fitted sigma at one curvature.
+
+    On strongly curved forms sigma stops growing, so what is right there is less than the slope.
+
+    Args:
+        fit: The fits.
+        model: A key of MODELS.
+        radius: Scatter radius of each channel.
+        kappa: Curvature for which sigma is to be right, 1/unit of the radius; 0 takes the slope.
+    """
+    found = []
+    for channel, own in zip(fit.channels, radius, strict=True):
+        slope, scale = channel.sigma0[model] * own, own * kappa
+        if scale > fit.scales[0]:
+            sigmas = [one.sigma for one in channel.free[model]]
+            at = float(np.interp(math.log(scale), np.log(fit.scales), sigmas))
+            slope = min(slope, at / kappa)
+        found.append(slope)
+    red, green, blue = found
+    return red, green, blue
 
 
 def proportional(scales: Array, sigma: Array) -> tuple[float, float]:

@@ -10,7 +10,13 @@ import pytest
 
 from cdrf_addon.core.errors import MeasurementError
 from cdrf_addon.core.fitting import MODELS, ModelFitter
-from cdrf_addon.core.material_fit import WEIGHTINGS, fit_material, proportional, sigma_per_scale
+from cdrf_addon.core.material_fit import (
+    WEIGHTINGS,
+    fit_material,
+    proportional,
+    sigma0_at,
+    sigma_per_scale,
+)
 from cdrf_addon.core.measurement import SphereMeasurement, equator_weights
 from cdrf_addon.core.reflectance import reflectance
 
@@ -117,3 +123,15 @@ def test_the_paper_curve_is_fitted_where_it_is_not_the_truth() -> None:
     ring = ModelFitter("ring", THETA, weights).fit(values)
     lambert = math.sqrt(float((reflectance(THETA, 0.0) - values) ** 2 @ weights))
     assert 1e-3 < ring.rms < 0.7 * lambert
+
+
+def test_sigma0_at_a_curvature_follows_saturation() -> None:
+    fit = fit_material(synthetic("sphere"))
+    radius = (1.0, 0.5, 0.25)
+    slopes = [slope * own for slope, own in zip(SLOPES, radius, strict=True)]
+    assert sigma0_at(fit, "sphere", radius, 0.0) == pytest.approx(slopes, rel=0.03)
+    assert sigma0_at(fit, "sphere", radius, 1e-4) == pytest.approx(slopes, rel=0.03)
+    for kappa in (0.2, 1.0, 3.0):
+        expected = [float(saturating(own * kappa, slope)) / kappa
+                    for slope, own in zip(SLOPES, radius, strict=True)]  # fmt: skip
+        assert sigma0_at(fit, "sphere", radius, kappa) == pytest.approx(expected, rel=0.03)
