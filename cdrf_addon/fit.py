@@ -16,6 +16,7 @@ import json
 import math
 import os
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -265,7 +266,11 @@ def run(options: argparse.Namespace) -> None:
     out.mkdir(parents=True, exist_ok=True)
     colour = (options.color[0], options.color[1], options.color[2])
     request = Request(colour, options.quality, options.seed, method=options.method)
-    measurement = run_measurement(request, out if options.no_cache else cache_folder())
+    if options.no_cache:
+        with tempfile.TemporaryDirectory(prefix="cdrf-fit-") as place:
+            measurement = run_measurement(request, Path(place))
+    else:
+        measurement = run_measurement(request, cache_folder())
     model = MeasuredModel(measurement, options.radius)
     fit = fit_material(measurement, options.weighting)
     seconds = time.perf_counter() - start
@@ -289,6 +294,8 @@ def main(argv: list[str] | None = None) -> int:
     parser = make_parser()
     try:
         options = parser.parse_args(own_arguments(sys.argv) if argv is None else argv)
+        if options.material and options.blend is None:
+            raise MeasurementError("--material names a material of the file given by --blend.")
         if options.blend is None and max(options.radius) * options.scale <= 0.0:
             raise MeasurementError("radius times scale is 0: nothing scatters, nothing to measure.")
     except MeasurementError as error:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -34,10 +35,11 @@ WORKER = Path(__file__).resolve().with_name("measure_worker.py")
 PROGRESS = "CDRF-PROGRESS"
 POLL_SECONDS = 0.05
 KILL_SECONDS = 10.0
+STALE_SECONDS = 24.0 * 3600.0
 RANDOM_WALK = "RANDOM_WALK"
 # Scales from which nothing is left but Lambert's shape, to which nothing more changes. Until 4.5,
 # and in what 5.x calls legacy, the same radius scatters about a tenth as far.
-FIRST_SCALE, ROWS, ROWS_PER_OCTAVE = 2.0**-8, 25, 2
+FIRST_SCALE, ROWS, ROWS_PER_OCTAVE = 2.0**-8, 22, 2
 OLD_REACH = 8.0
 
 
@@ -52,7 +54,7 @@ class Quality:
 
 QUALITIES = {
     "preview": Quality((64, 12), 8, 4),
-    "default": Quality((80, 20), 24, 8),
+    "default": Quality((80, 20), 32, 8),
     "fine": Quality((96, 24), 64, 8),
 }
 DEFAULT_QUALITY = "default"
@@ -121,7 +123,10 @@ class Request:
     def key(self) -> str:
         """Hash of everything that decides the result."""
         quality = asdict(QUALITIES[self.quality])
-        facts = [VERSION, bpy.app.version_string, asdict(self.complete()), quality]
+        # Colours come in double precision from a command line and in single from a panel.
+        albedo = [float(f"{part:.6g}") for part in self.albedo]
+        request = asdict(self.complete()) | {"albedo": albedo}
+        facts = [VERSION, bpy.app.version_string, request, quality]
         text = json.dumps(facts, sort_keys=True)
         return hashlib.blake2b(text.encode(), digest_size=12).hexdigest()
 
@@ -153,9 +158,13 @@ def cache_folder() -> Path:
 def cached(request: Request, folder: Path) -> SphereMeasurement | None:
     """Return an earlier measurement of the same request; a damaged file counts as none."""
     try:
-        return load(_file(request, folder))
+        found = load(_file(request, folder))
     except MeasurementError:
         return None
+    same = np.allclose(found.albedo, request.albedo, atol=1e-5) and np.array_equal(
+        found.scales, request.complete().scales
+    )
+    return found if same else None
 
 
 def _file(request: Request, folder: Path) -> Path:
@@ -187,12 +196,14 @@ def measure_steps(
         return found
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        _sweep(folder)
         with tempfile.TemporaryDirectory(dir=folder, prefix="run-") as place:
             yield from _render(request, Path(place))
             measurement = _read(request, Path(place) / "answer.npz")
     except OSError as error:
         raise MeasurementError(
-            f"Spheres could not be measured in {folder}: {error.strerror}."
+            f"Spheres could not be measured in {folder}: {error.strerror}. Check that this folder "
+            "can be written and that the disk is not full."
         ) from error
     save(_file(request, folder), measurement)
     return measurement
@@ -235,7 +246,11 @@ def _child(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
     """Run a command with its output in a file; end it when the block is left."""
     with log.open("wb") as output:
         child = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT
+            # The child reads this pipe, and ends when we do, however that comes.
+            command,
+            stdin=subprocess.PIPE,
+            stdout=output,
+            stderr=subprocess.STDOUT,
         )
         try:
             yield child
@@ -243,6 +258,18 @@ def _child(command: list[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
             if child.poll() is None:
                 child.kill()
             child.wait(KILL_SECONDS)
+            if child.stdin is not None:
+                child.stdin.close()
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what runs that were killed have left."""
+    for left in folder.glob("run-*"):
+        try:
+            if time.time() - left.stat().st_mtime > STALE_SECONDS:
+                shutil.rmtree(left, ignore_errors=True)
+        except OSError:
+            continue  # another process was faster
 
 
 def _lines(log: Path) -> list[str]:

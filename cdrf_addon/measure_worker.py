@@ -19,7 +19,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
+import threading
 import traceback
 from pathlib import Path
 from typing import Any
@@ -163,6 +165,8 @@ def read_pixels(path: Path) -> Array:
     """Read a picture, (height, width, 3), row 0 at the bottom."""
     image = bpy.data.images.load(str(path))
     width, height = image.size
+    if not width * height:
+        raise OSError("a picture could not be read back; is the disk full?")
     pixels = np.empty(width * height * 4, dtype=np.float32)
     image.pixels.foreach_get(pixels)
     bpy.data.images.remove(image)
@@ -210,8 +214,16 @@ def work(order: dict[str, Any]) -> None:
     tell(1.0, "Path tracing done")
 
 
+def end_with_parent() -> None:
+    """Wait for the end of the parent's pipe, which comes when the parent is gone."""
+    if sys.stdin is not None and not sys.stdin.isatty():
+        sys.stdin.read()
+        os._exit(1)
+
+
 def main() -> int:
     """Do what the order says; 0 if it was done."""
+    threading.Thread(target=end_with_parent, daemon=True).start()
     try:
         work(json.loads(Path(sys.argv[-1]).read_text(encoding="utf-8")))
     except Exception:  # noqa: BLE001  (the parent gets the text, whatever it is)
@@ -224,7 +236,5 @@ if __name__ == "__main__":
     code = main()
     sys.stdout.flush()
     sys.stderr.flush()
-    import os
-
     # Blender 4.5 as a module now and then hangs in its libraries' destructors.
     os._exit(code)

@@ -12,12 +12,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from . import ids
-from .blender import display, legend, materials, state, viewport
+from .blender import display, legend, materials, reflectance_models, state, viewport
 from .blender.mesh_io import remove_curvature
 from .blender.setup import (
     Report,
     Setup,
-    remove_unused_groups,
     skins_of,
     skins_on,
     translucent_objects,
@@ -242,7 +241,7 @@ class CDRF_OT_remove(bpy.types.Operator):
                 item.data.cdrf.fingerprint = ""
                 if ids.SCALE_KEY in item:
                     del item[ids.SCALE_KEY]
-        remove_unused_groups()
+        reflectance_models.remove_unused()
         self.report({"INFO"}, f"CDRF: {len(chosen)} material(s) as before")
         return {"FINISHED"}
 

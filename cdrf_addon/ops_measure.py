@@ -40,11 +40,15 @@ from .measure import (
     cache_folder,
     measure_steps,
 )
+from .ops_model import warn_if_overridden
 
 Colour = tuple[float, float, float]
 TICK_SECONDS = 0.1
 # Cycles has no albedo of 0 to measure.
 LEAST_ALBEDO = 1e-3
+# Principal curvatures of a sphere are equal; an open cylinder's are not.
+ROUND = 1e-2
+MOST_RADIUS = 1e6
 # Shown in the picture where nothing is known of the object.
 MIDDLE_SCALE = 0.25
 QUALITY_ITEMS = (
@@ -60,7 +64,8 @@ class _PathTraced(bpy.types.Operator):
     _steps: Generator[tuple[float, str], None, Any]
     _timer: bpy.types.Timer
     _start: float
-    _skin: str
+    _skin: int
+    _kappa: float
     _round: bool
     SETTINGS: tuple[str, ...] = ("albedo", "radius", "quality", "seed")
 
@@ -115,9 +120,15 @@ class _PathTraced(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         skin = active_skin(context.object)
         assert skin is not None
-        own = own_scattering(skin)
-        self.albedo, self.radius, self.method = own.albedo, own.radius, own.method
+        self._fill_in(skin)
         return context.window_manager.invoke_props_dialog(self, width=360)
+
+    def _fill_in(self, skin: bpy.types.Material) -> None:
+        """Take from the material what nobody has set."""
+        own = own_scattering(skin)
+        for name in ("albedo", "radius", "method"):
+            if not self.properties.is_property_set(name):
+                setattr(self, name, getattr(own, name))
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
@@ -128,8 +139,12 @@ class _PathTraced(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         skin = active_skin(context.object)
         assert skin is not None
-        self._skin = skin.name
-        self._round = context.object.data.cdrf.kind == CONSTANT
+        self._fill_in(skin)
+        self._skin = skin.session_uid
+        known = context.object.data.cdrf
+        self._kappa = known.median
+        kappa, k1, k2, _ = known.mean_values
+        self._round = known.kind == CONSTANT and abs(k1 - k2) <= ROUND * kappa
         try:
             self._steps = self._work(self._request())
             if context.window is None or bpy.app.background:
@@ -181,21 +196,22 @@ class _PathTraced(bpy.types.Operator):
         context.workspace.status_text_set(None)
 
     def _request(self) -> Request:
-        if not max(self.radius) > 0.0:
-            raise ParameterError("Every scatter radius is 0, so nothing scatters: enter one.")
+        if not 0.0 < max(self.radius) <= MOST_RADIUS:
+            raise ParameterError(
+                f"A scatter radius above 0, up to {MOST_RADIUS:g}, is wanted: enter one."
+            )
         red, green, blue = (max(float(part), LEAST_ALBEDO) for part in self.albedo)
         return Request((red, green, blue), self.quality, self.seed, method=self.method)
 
     def _material(self) -> bpy.types.Material:
         """Return the material the work began with, which may have gone meanwhile."""
-        skin = bpy.data.materials.get(self._skin)
-        if cdrf_node(skin) is None:
-            raise SceneError(
-                f"'{self._skin}' is no longer there or no longer translucent; the measurement is "
-                "kept, so the next one of the same material is done at once."
-            )
-        assert skin is not None
-        return skin
+        for skin in bpy.data.materials:
+            if skin.session_uid == self._skin and cdrf_node(skin) is not None:
+                return skin
+        raise SceneError(
+            "The material is no longer there or no longer translucent; the measurement is kept, "
+            "so the next one of the same material is done at once."
+        )
 
     def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
         """Path-trace, then work out what this operator is after."""
@@ -280,10 +296,12 @@ class CDRF_OT_measure(_PathTraced):
     def _finish(self, context: bpy.types.Context, found: Any) -> set[str]:
         skin = self._material()
         model, sigma0 = found
-        skin.cdrf.measured = ensure_table(model).key
+        table = ensure_table(model)
+        skin.cdrf.measured, skin.cdrf.measured_image = table.key, table.image
         reflectance_models.set_model(skin, model.key)
         skin.cdrf.sigma0 = sigma0
         skin.cdrf.sigma0_ratio = (1.0, 1.0, 1.0)
+        warn_if_overridden(self, skin)
         self.report({"INFO"}, f"CDRF: '{skin.name}' is shaded as its spheres were path-traced")
         return {"FINISHED"}
 
@@ -307,11 +325,12 @@ class CDRF_OT_fit(_PathTraced):
             reflectance_models.set_kind(skin, SPHERE)
         name = "ring" if reflectance_models.kind_of_model(skin) == RING else "sphere"
         # Right at the object's middle curvature; that sphere is shown, too.
-        kappa = context.object.data.cdrf.median if context.object else 0.0
-        reflectance_models.set_channel_sigma0(skin, sigma0_at(fitted, name, self.radius, kappa))
+        sigma0 = sigma0_at(fitted, name, self.radius, self._kappa)
+        reflectance_models.set_channel_sigma0(skin, sigma0)
+        warn_if_overridden(self, skin)
         for sentence in fitted.sentences():
             self.report({"INFO"}, sentence)
-        scale = max(self.radius) * kappa or MIDDLE_SCALE
+        scale = max(self.radius) * self._kappa or MIDDLE_SCALE
         try:
             path = picture_path(skin, cache_folder())
             make_picture(model, fitted, scale, path)

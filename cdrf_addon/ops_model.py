@@ -39,6 +39,13 @@ def _skin(context: bpy.types.Context) -> bpy.types.Material:
     return skin
 
 
+def warn_if_overridden(operator: bpy.types.Operator, skin: bpy.types.Material) -> None:
+    """Say so where a keyframe or a link decides the scatter distance, whatever was set."""
+    what = reflectance_models.overridden(skin)
+    if what:
+        operator.report({"WARNING"}, what)
+
+
 class CDRF_OT_set_model(_OnSkin):
     """Choose how the light that spreads under the surface shades it"""
 
@@ -55,6 +62,7 @@ class CDRF_OT_set_model(_OnSkin):
         except CdrfError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        warn_if_overridden(self, skin)
         return {"FINISHED"}
 
 
@@ -104,6 +112,7 @@ class CDRF_OT_preset(_OnSkin):
         if self.with_color and not node.inputs[ids.BASE_COLOR].is_linked:
             node.inputs[ids.BASE_COLOR].default_value = (*preset.albedo, 1.0)
         self._warn_of_size(context.object, skin.cdrf.sigma0, metres)
+        warn_if_overridden(self, skin)
         self.report({"INFO"}, f"CDRF: {preset.label}. {preset.description}")
         return {"FINISHED"}
 
@@ -140,6 +149,7 @@ class CDRF_OT_read_shader(_OnSkin):
         reflectance_models.set_scattering(skin, found)
         for note in found.notes:
             self.report({"WARNING"}, note)
+        warn_if_overridden(self, skin)
         self.report({"INFO"}, f"CDRF: scatter distance {skin.cdrf.sigma0:.4g} from the nodes")
         return {"FINISHED"}
 

@@ -149,6 +149,8 @@ class CdrfMaterial(bpy.types.PropertyGroup):
     )
     chosen_model: StringProperty(options={"HIDDEN"})
     measured: StringProperty(options={"HIDDEN"})
+    # Blender deletes pictures that nobody uses; this one is wanted again.
+    measured_image: PointerProperty(type=bpy.types.Image, options={"HIDDEN"})
     chosen_sigma0: FloatProperty(default=UNSET, options={"HIDDEN"})
     chosen_ratio: FloatVectorProperty(size=3, default=(1.0, 1.0, 1.0), options={"HIDDEN"})
 

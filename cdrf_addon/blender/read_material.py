@@ -19,6 +19,8 @@ from ..compat import uses_nodes
 Colour = tuple[float, float, float]
 # Pixels of a picture that are looked at for its mean.
 MOST_PIXELS = 250_000
+# How Blender makes one number of a colour (Rec. 709).
+LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class Scattering:
 def read_scattering(material: bpy.types.Material) -> Scattering | None:
     """Read the scattering of the material's own surface; None if nothing in it scatters.
 
-    The first node counts that feeds the material's output, our own nodes left aside.
+    The first node counts that feeds the material's output, through mixes and node groups; our own
+    nodes are left aside.
     """
     if not uses_nodes(material):
         return None
@@ -52,41 +55,62 @@ def read_scattering(material: bpy.types.Material) -> Scattering | None:
     pending = [output.inputs["Surface"] for output in outputs]
     seen = set()
     while pending:
-        socket = pending.pop(0)
-        if not socket.is_linked:
+        source = _source(pending.pop(0))
+        if source is None or source.node.mute or source in seen:
             continue
-        node = socket.links[0].from_node
-        if node.name in seen:
-            continue
-        seen.add(node.name)
-        found = _of_node(node)
+        seen.add(source)
+        found = _of_node(source.node)
         if found is not None:
             return found
-        pending += [item for item in node.inputs if item.type == "SHADER"]
+        pending += _shaders_of(source)
     return None
+
+
+def _shaders_of(source: bpy.types.NodeSocket) -> list[bpy.types.NodeSocket]:
+    """Inputs through which shaders reach an output: of a mix those that show, of a group inside."""
+    node = source.node
+    if node.type == "GROUP" and node.node_tree is not None:
+        return [
+            socket
+            for inner in node.node_tree.nodes
+            if inner.type == "GROUP_OUTPUT" and inner.is_active_output
+            for socket in inner.inputs
+            if socket.identifier == source.identifier
+        ]
+    shaders = [socket for socket in node.inputs if socket.type == "SHADER"]
+    if node.type == "MIX_SHADER" and not node.inputs[0].is_linked:
+        share = node.inputs[0].default_value
+        if share <= 0.0 or share >= 1.0:
+            return shaders[:1] if share <= 0.0 else shaders[1:]
+    return shaders
 
 
 def _of_node(node: bpy.types.ShaderNode) -> Scattering | None:
     notes: list[str] = []
     if node.type == "BSDF_PRINCIPLED":
         weight = _number(node, "Subsurface Weight", notes)
+        if _source(node.inputs["Subsurface Weight"]) is not None and notes:
+            weight = 1.0
+            notes = [f"Subsurface Weight of '{node.name}' varies; it was taken as 1."]
+        unseen = max(_number(node, name, []) for name in ("Metallic", "Transmission Weight"))
+        weight *= max(1.0 - unseen, 0.0)
         if not weight > 0.0:
             return None
         method = node.subsurface_method
-        albedo = _colour(node, "Base Color", notes)
-        scale = _number(node, "Subsurface Scale", notes)
-        radius = _vector(node, "Subsurface Radius", notes)
+        names = ("Base Color", "Subsurface Scale", "Subsurface Radius", "Subsurface Anisotropy")
     elif node.type == "SUBSURFACE_SCATTERING":
         weight = 1.0
         method = node.falloff
-        albedo = _colour(node, "Color", notes)
-        scale = _number(node, "Scale", notes)
-        radius = _vector(node, "Radius", notes)
+        names = ("Color", "Scale", "Radius", "Anisotropy")
     else:
         return None
-    lengths = [max(part * scale, 0.0) for part in radius]
-    if not max(lengths) > 0.0:
+    albedo = _colour(node, names[0], notes)
+    scale = _number(node, names[1], notes)
+    lengths = [max(part * scale, 0.0) for part in _vector(node, names[2], notes)]
+    if not (max(lengths) > 0.0 and np.isfinite(lengths).all()):
         return None
+    if method != "BURLEY" and _number(node, names[3], []) != 0.0:
+        notes.append(f"The anisotropy of '{node.name}' is left out.")
     if weight < 1.0:
         notes.append(
             f"Only {weight:.0%} of '{node.name}' scatters; CDRF takes the whole surface as if it "
@@ -96,15 +120,16 @@ def _of_node(node: bpy.types.ShaderNode) -> Scattering | None:
 
 
 def _number(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> float:
-    return float(_value(node, name, notes))
+    parts = _value(node, name, notes)
+    return parts[0] if len(parts) == 1 else float(np.dot(parts[:3], LUMINANCE))
 
 
 def _vector(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> Colour:
-    x, y, z = _value(node, name, notes)
-    return float(x), float(y), float(z)
+    parts = _value(node, name, notes)
+    return (parts[0],) * 3 if len(parts) < 3 else (parts[0], parts[1], parts[2])
 
 
-def _value(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> Any:
+def _value(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> list[float]:
     """Read an input, through plain value nodes and reroutes; a texture leaves the socket's own."""
     socket = node.inputs[name]
     source = _source(socket)
@@ -115,20 +140,14 @@ def _value(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> Any:
     return _plain(socket)
 
 
-def _colour(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> Any:
-    socket = node.inputs[name]
-    source = _source(socket)
-    if source is None:
-        return _plain(socket)
-    if source.node.type == "RGB":
-        return _plain(source)
-    image = getattr(source.node, "image", None) if source.node.type == "TEX_IMAGE" else None
-    mean = _mean(image)
-    if mean is None:
-        notes.append(f"{name} comes from '{source.node.name}'; its plain value was taken instead.")
-        return _plain(socket)
-    notes.append(f"{name} comes from a picture; its mean colour was taken.")
-    return mean
+def _colour(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> Colour:
+    source = _source(node.inputs[name])
+    if source is not None and source.node.type == "TEX_IMAGE" and source.name == "Color":
+        mean = _mean(source.node.image)
+        if mean is not None:
+            notes.append(f"{name} comes from a picture; its mean colour was taken.")
+            return mean
+    return _vector(node, name, notes)
 
 
 def _source(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
@@ -143,10 +162,10 @@ def _source(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
     return None
 
 
-def _plain(socket: bpy.types.NodeSocket) -> Any:
-    """Value of a socket: a number, or the first three of several."""
-    value = socket.default_value
-    return float(value) if isinstance(value, float | int) else tuple(float(v) for v in value)[:3]
+def _plain(socket: bpy.types.NodeSocket) -> list[float]:
+    """Value of a socket: one number, or the three of a vector or colour."""
+    value: Any = socket.default_value
+    return [float(value)] if isinstance(value, float | int) else [float(v) for v in value][:3]
 
 
 def _mean(image: bpy.types.Image | None) -> Colour | None:

@@ -14,13 +14,15 @@ from collections.abc import Sequence
 import bpy
 
 from .. import ids
-from ..compat import walk_method
+from ..compat import animation_curves, walk_method
 from ..core.errors import ParameterError, SceneError
 from ..core.models import (
     DEFAULT_KIND,
     MEASURED,
     PROFILE,
     RING,
+    SKIN_PROFILE,
+    SPHERE,
     Model,
     parse_profile,
     profile,
@@ -93,22 +95,57 @@ def set_model(material: bpy.types.Material, key: str) -> None:
     A model with colour has the ratio of the channels in its table: the material's own becomes 1,
     and is that of the table when it is left again.
     """
-    before, after = table_of(ensure_chosen(material)), table_of(key)
+    before, after = find_table(model_key(material)), table_of(key)
     settings = material.cdrf
     settings.chosen_model = key
     ratio = tuple(settings.sigma0_ratio)
-    if after.colour and not before.colour:
-        settings.sigma0 *= max(ratio)
+    if before is not None and after.colour and not before.colour:
+        if max(ratio) > 0.0:
+            settings.sigma0 *= max(ratio)
         ratio = (1.0, 1.0, 1.0)
-    elif before.colour and not after.colour:
+    elif before is not None and before.colour and not after.colour:
         ratio = tuple(r * math.sqrt(m) for r, m in zip(ratio, before.moments, strict=True))
     change_variant(material, ratio, key)
     settings.sigma0_ratio = ratio
+    remove_unused()
+
+
+def remove_unused() -> None:
+    """Delete our shader groups that no material uses, and what only they used."""
+    groups = bpy.data.node_groups
+    for group in list(groups):
+        if shader.is_shader_group(group) and group.users == 0 and group.library is None:
+            groups.remove(group)
+    for group in list(groups):
+        role = str(group.get(ids.ROLE_KEY, ""))
+        if role.startswith(ids.ROLE_REFLECTANCE) and group.users == 0 and group.library is None:
+            groups.remove(group)
+    for image in list(bpy.data.images):
+        ours = image.get(ids.ROLE_KEY) == ids.ROLE_LUT and image.library is None
+        if ours and image.users == 0:
+            bpy.data.images.remove(image)
+
+
+def overridden(material: bpy.types.Material) -> str:
+    """Say what decides the scatter distance in place of its value; empty if nothing does."""
+    node = cdrf_node(material)
+    if node is None:
+        return ""
+    for name in (ids.SIGMA0, ids.SIGMA0_RATIO):
+        socket = node.inputs[name]
+        moved = animation_curves(material.node_tree, socket.path_from_id("default_value"))
+        if socket.is_linked or moved:
+            how = "connected to a node" if socket.is_linked else "animated"
+            return (
+                f"{name} of '{material.name}' is {how}, and that decides what is seen: "
+                f"{'disconnect it' if socket.is_linked else 'clear its keyframes'} to use this."
+            )
+    return ""
 
 
 def has_colour(material: bpy.types.Material) -> bool:
     """Tell whether the material's model has a table of its own for each channel."""
-    return table_of(ensure_chosen(material)).colour
+    return kind_of_model(material) in {PROFILE, MEASURED}
 
 
 def set_scattering(material: bpy.types.Material, found: Scattering) -> None:
@@ -120,7 +157,7 @@ def set_scattering(material: bpy.types.Material, found: Scattering) -> None:
 
 def channel_sigma0(material: bpy.types.Material) -> list[float]:
     """Scatter distance of red, green and blue, whatever model the material has."""
-    moments = table_of(ensure_chosen(material)).moments
+    moments = table_of(ensure_chosen(material)[0]).moments
     settings = material.cdrf
     return [
         settings.sigma0 * ratio * math.sqrt(moment)
@@ -154,23 +191,46 @@ def apply_preset(material: bpy.types.Material, preset: Preset, metres: float, si
         SceneError: The material is linked.
     """
     sigma0, ratio = in_units(preset.sigma0, metres, size)
-    set_kind(material, preset.model)
+    if preset.model == PROFILE:
+        require_editable(material)
+        material.cdrf.profile = SKIN_PROFILE.to_text()
+        material.cdrf.profile_base = SPHERE
+        set_kind(material, PROFILE)
+        ratio = (1.0, 1.0, 1.0)  # a profile has its channels' widths in its table
+    elif has_colour(material):
+        set_kind(material, DEFAULT_KIND)
     material.cdrf.sigma0 = sigma0
-    # A profile has its channels' widths in its table.
-    material.cdrf.sigma0_ratio = (1.0, 1.0, 1.0) if preset.model == PROFILE else ratio
+    material.cdrf.sigma0_ratio = ratio
 
 
-def ensure_chosen(material: bpy.types.Material) -> str:
-    """Return the key of the material's model, its table made anew if it was deleted.
+def ensure_chosen(material: bpy.types.Material) -> tuple[str, str]:
+    """Make the material's table anew if it was deleted.
 
-    A measured table cannot be made at once: without it the default model stands in.
+    A measured table cannot be made at once, and a profile only of a list of Gaussians: without them
+    the default model stands in.
+
+    Returns:
+        The key of the model, and a sentence if it is not the one that was chosen.
     """
     key = model_key(material)
-    if find_table(key) is None:
-        model = model_of_kind(material, key.split()[0])
-        key = ensure_table(model if model is not None else sphere()).key
+    if find_table(key) is not None:
+        return key, ""
+    kind = key.split()[0]
+    try:
+        model = model_of_kind(material, kind)
+    except ParameterError:
+        model = None
+    if model is not None:
+        key = ensure_table(model).key
         material.cdrf.chosen_model = key
-    return key
+        return key, ""
+    key = ensure_table(sphere()).key
+    material.cdrf.chosen_model = key
+    what = "measured table" if kind == MEASURED else "profile's table"
+    return key, (
+        f"The {what} of '{material.name}' was deleted; it is shaded by the sphere model now: "
+        f"{'press Measure again' if kind == MEASURED else 'mend the profile and choose it again'}."
+    )
 
 
 def change_variant(

@@ -51,7 +51,7 @@ from .mesh_io import (
     to_original_vertices,
     write_curvature,
 )
-from .read_material import read_scattering
+from .read_material import Scattering, read_scattering
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -155,6 +155,7 @@ class Setup:
         self.report = Report()
         self.slots: list[bpy.types.MaterialSlot] = []
         self.bare: list[bpy.types.Object] = []
+        self._own: dict[bpy.types.Material, Scattering | None] = {}
         self._choose(list(objects), only_active_slot, convert)
         self.work = self._gather()
 
@@ -341,6 +342,12 @@ class Setup:
 
     def commit(self) -> Report:
         """Write attributes, groups and materials; the only part that changes the file."""
+        # Read first: what fails here fails before the first write.
+        self._own = {
+            slot.material: read_scattering(slot.material)
+            for slot in self.slots
+            if slot.material is not None
+        }
         self._give_materials()
         lights = scene_lights(self.scene, self.view_layer)
         sources = {
@@ -352,7 +359,7 @@ class Setup:
         for material, source in sources.items():
             self._install(material, source, lights)
         display.refresh(self.scene, skins_of(self.view_layer))
-        remove_unused_groups()
+        reflectance_models.remove_unused()
         self._sum_up(lights, sources)
         return self.report
 
@@ -414,13 +421,16 @@ class Setup:
         settings = material.cdrf
         fresh = cdrf_node(material) is None
         ratio = tuple(settings.sigma0_ratio)
-        wanted = shader.variant_of(ratio, source, reflectance_models.ensure_chosen(material))
+        model, lost = reflectance_models.ensure_chosen(material)
+        if lost:
+            self.report.warnings.append(lost)
+        wanted = shader.variant_of(ratio, source, model)
         group = shader.ensure_shader_group(wanted, self.scene, lights)
         node = install(material, group)
         work = self._work_of(material)
         if fresh:
             node.inputs[ids.SIGMA0_RATIO].default_value = ratio
-            own = read_scattering(material) if settings.chosen_sigma0 < 0.0 else None
+            own = self._own.get(material) if settings.chosen_sigma0 < 0.0 else None
             if own is not None:
                 reflectance_models.set_scattering(material, own)
                 self.report.read.append(material.name)
@@ -505,13 +515,6 @@ def linked_skins(item: bpy.types.Object) -> list[bpy.types.Material]:
 def _present_source(material: bpy.types.Material) -> str:
     node = cdrf_node(material)
     return shader.stamped_variant(node.node_tree).source if node is not None else ""
-
-
-def remove_unused_groups() -> None:
-    """Delete our shader groups that no material uses any more."""
-    for group in list(bpy.data.node_groups):
-        if shader.is_shader_group(group) and group.users == 0 and group.library is None:
-            bpy.data.node_groups.remove(group)
 
 
 def _materials(item: bpy.types.Object) -> set[bpy.types.Material]:

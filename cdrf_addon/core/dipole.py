@@ -35,8 +35,10 @@ class Medium:
 
     def __post_init__(self) -> None:
         for number in (self.scattering, self.absorption, self.eta):
-            if not (math.isfinite(number) and number > 0.0):
-                raise ParameterError("Scattering coefficients are positive numbers.")
+            if not 1e-9 <= number <= 1e9:
+                raise ParameterError("Scattering coefficients are positive numbers, 1e-9 to 1e9.")
+        if not 1.0 <= self.eta <= 3.0:
+            raise ParameterError("A refractive index is a number from 1 to 3.")
 
     @property
     def extinction(self) -> float:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Evaluate = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
 # Between these widths, radians, the energy is tabulated; beyond them it is that at the ends.
-FIRST_SIGMA, LAST_SIGMA, WIDTHS = 1e-3, 10.0, 256
+FIRST_SIGMA, LAST_SIGMA, WIDTHS = 1e-7, 10.0, 512
 NODES = 256
 
 

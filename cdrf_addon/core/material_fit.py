@@ -119,14 +119,14 @@ def proportional(scales: Array, sigma: Array) -> tuple[float, float]:
     used = (sigma >= PROPORTIONAL_FROM) & (sigma <= PROPORTIONAL_TO)
     if used.sum() < 2:
         raise MeasurementError(
-            "The spheres do not scatter as little as the fit needs; "
-            "measure a wider range of scales."
+            "The spheres do not scatter as little as the fit needs: too much of the measurement is "
+            "noise. Measure again at a finer quality."
         )
     # The median of the ratios: one noisy sphere does not move it.
     slope = float(np.median(sigma[used] / scales[used]))
     # The last that still is proportional: before it noise may put one off, after it saturation all.
     held = np.flatnonzero(np.abs(sigma / (slope * scales) - 1.0) <= PROPORTIONAL_WITHIN)
-    last = int(held[-1])
+    last = int(held[-1]) if len(held) else int(np.flatnonzero(used)[0])
     return slope, np.inf if last == len(scales) - 1 else float(scales[last])
 
 

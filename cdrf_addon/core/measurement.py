@@ -9,7 +9,9 @@ from all sides.
 from __future__ import annotations
 
 import math
+import tokenize
 import zipfile
+import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +27,13 @@ if TYPE_CHECKING:
 
 MAGIC = "cdrf sphere measurement"
 FORMAT = 2
+# What numpy and zipfile raise on files that are damaged or none of theirs.
+DAMAGED = (
+    *(OSError, ValueError, EOFError, AttributeError, TypeError, KeyError, NotImplementedError),
+    *(RuntimeError, SyntaxError, zipfile.BadZipFile, zlib.error, tokenize.TokenError),
+)
+# No body sends out so many times what an opaque one does.
+MOST_VALUE = 100.0
 # Bins of theta in radians, where the pixels are not in columns of equal N.L.
 BIN = math.radians(3.0)
 LEAST_PIXELS = 3
@@ -75,6 +84,8 @@ class SphereMeasurement:
             raise MeasurementError("The measurement's arrays do not fit together; measure again.")
         if not all(np.isfinite(array).all() for array in arrays) or (self.errors < 0.0).any():
             raise MeasurementError("The measurement holds NaN or infinity; measure again.")
+        if np.abs(self.values).max() > MOST_VALUE or self.values.mean() < 0.0:
+            raise MeasurementError("The measurement holds impossible values; measure again.")
         if (np.diff(self.scales) <= 0.0).any() or self.scales[0] <= 0.0:
             raise MeasurementError("The measurement's scales do not rise; measure again.")
         if (np.diff(self.cosine) <= 0.0).any() or np.abs(self.cosine).max() > 1.0:
@@ -195,16 +206,19 @@ def load(path: Path) -> SphereMeasurement:
             content = {name: file[name] for name in file.files}
     except FileNotFoundError as error:
         raise MeasurementError(f"{path} does not exist.") from error
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
+    except DAMAGED as error:
         raise MeasurementError(f"{path.name} is no measurement of spheres, or damaged.") from error
     names = {field.name for field in fields(SphereMeasurement)}
     if str(content.pop("magic", "")) != MAGIC or not names <= set(content):
         raise MeasurementError(f"{path.name} is no measurement of spheres.")
-    if (version := int(content.pop("format", 0))) != FORMAT:
+    if (version := str(content.pop("format", 0))) != str(FORMAT):
         raise MeasurementError(f"{path.name} has format {version}, not {FORMAT}; measure again.")
     plain = {
         name: value if value.ndim else value.item()
         for name, value in content.items()
         if name in names
     }
-    return SphereMeasurement(**plain)
+    try:
+        return SphereMeasurement(**plain)
+    except DAMAGED as error:
+        raise MeasurementError(f"{path.name} is no measurement of spheres, or damaged.") from error

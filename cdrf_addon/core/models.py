@@ -179,11 +179,11 @@ def parse_profile(text: str, base: str = SPHERE) -> Profile:
         try:
             numbers = [float(word) for word in words]
         except ValueError:
-            raise ParameterError(f"'{line.strip()}' is not a list of numbers.") from None
+            raise ParameterError(f"'{line.strip()[:40]}' is not a list of numbers.") from None
         if len(numbers) != 4:
             raise ParameterError(
-                f"'{line.strip()}' has {len(numbers)} numbers; a Gaussian has four: its width, "
-                "then its parts of red, green and blue."
+                f"'{line.strip()[:40]}' has {len(numbers)} numbers; a Gaussian has four: its "
+                "width, then its parts of red, green and blue."
             )
         rows.append(numbers)
     return Profile(
@@ -233,18 +233,17 @@ def measured_model(
     from .measured import MeasuredModel
 
     slopes = [sigma_per_scale(spheres, channel) for channel in range(3)]
-    widest = int(np.argmax(radius))
-    table = MeasuredModel(spheres, radius, slopes[widest])
-    red, green, blue = (
-        float(ratio * slope / slopes[widest]) ** 2
-        for ratio, slope in zip(table.ratio, slopes, strict=True)
-    )
+    widths = [own * slope for own, slope in zip(radius, slopes, strict=True)]
+    sigma0 = max(widths)
+    # Rows are counted by the widest blur, scales by the largest radius.
+    table = MeasuredModel(spheres, radius, sigma0 / max(radius) if sigma0 > 0.0 else None)
+    red, green, blue = (float(width / sigma0) ** 2 for width in widths)
     facts = [spheres.blender, spheres.method, spheres.seed, spheres.samples]
     facts += [spheres.all_views, keep_energy]
     numbers = [float(number) for number in (*spheres.albedo, *table.ratio)]
     key = f"{MEASURED} {_hash(str(facts), str(numbers))}"
     evaluate = conserving(table.evaluate) if keep_energy else table.evaluate
-    return Model(MEASURED, key, evaluate, True, (red, green, blue)), max(radius) * slopes[widest]
+    return Model(MEASURED, key, evaluate, True, (red, green, blue)), sigma0
 
 
 def _hash(*parts: str) -> str:

@@ -83,5 +83,5 @@ def in_units(sigma0: Colour, unit_scale: float, size: float = 1.0) -> tuple[floa
         The largest of the three in units, and the three as factors of it.
     """
     largest = max(sigma0)
-    red, green, blue = (channel / largest for channel in sigma0)
+    red, green, blue = (channel / largest if largest > 0.0 else 1.0 for channel in sigma0)
     return largest * 1e-3 / unit_scale * size, (red, green, blue)

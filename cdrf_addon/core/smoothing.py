@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+# Rows that a cubic is fitted to; more lose detail, a higher degree keeps noise.
+ROWS_AT_ONCE, ROW_DEGREE = 7, 3
+LEAST_MOVE = 1e-12
 INTERVALS = 32
 STIFFNESSES = 10.0 ** np.arange(-4.0, 9.0, 0.25)
 # The spline's knots are closest within this many radians of the terminator.
@@ -160,3 +163,27 @@ def noise_factor(values: Array, errors: Array) -> float:
     second = values[:-2] - 2.0 * values[1:-1] + values[2:]
     expected = np.sqrt(errors[:-2] ** 2 + 4.0 * errors[1:-1] ** 2 + errors[2:] ** 2)
     return max(1.0, float(np.median(np.abs(second / expected)) / NORMAL_MEDIAN) ** 2)
+
+
+def smooth_rows(place: Array, rows: Array, noise: Array) -> Array:
+    """Smooth across rows by local cubics (Savitzky and Golay 1964), no further than their noise.
+
+    Seven rows, three octaves, are fitted by a cubic and its value at the row is taken; near the
+    ends the last seven. Four rows or fewer come back as they are.
+
+    Args:
+        place: (S,) where the rows stand: the logarithm of their scale.
+        rows: (S, C, N) curves.
+        noise: (S, C) standard error of each curve, RMS: no curve is moved by more than that.
+    """
+    window = min(ROWS_AT_ONCE, len(place))
+    degree = min(ROW_DEGREE, window - 1)
+    smooth = np.empty_like(rows)
+    for row, here in enumerate(place):
+        first = min(max(row - window // 2, 0), len(place) - window)
+        some = slice(first, first + window)
+        basis = np.vander(place[some] - here, degree + 1)
+        smooth[row] = np.tensordot(np.linalg.pinv(basis)[-1], rows[some], axes=1)
+    moved = np.sqrt(((smooth - rows) ** 2).mean(axis=-1))
+    part = np.minimum(1.0, noise / np.maximum(moved, LEAST_MOVE))
+    return np.asarray(rows + part[..., None] * (smooth - rows))

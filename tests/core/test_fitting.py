@@ -112,7 +112,7 @@ def test_proportional_everywhere_is_infinite() -> None:
 
 
 def test_too_few_small_spheres_are_refused() -> None:
-    with pytest.raises(MeasurementError, match="wider range"):
+    with pytest.raises(MeasurementError, match="finer quality"):
         proportional(np.array([1.0, 2.0, 4.0]), np.array([0.5, 0.55, 0.6]))
 
 
