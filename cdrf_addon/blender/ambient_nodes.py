@@ -128,6 +128,8 @@ def bands_image(table: Table) -> bpy.types.Image:
     image.update()
     image.pack()
     image[ids.ROLE_KEY] = role
+    # Kept in the file even where no light looks it up: a measured one could not be made again.
+    table.image.use_fake_user = True
     return image
 
 

@@ -180,7 +180,8 @@ def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) ->
     variant = stamped_variant(group)
     table = find_table(variant.model)
     if table is None:
-        return False
+        # Where only the world shines nothing may have used it, and a saved file drops it.
+        return not lights and not wired_lights(group)
     wanted = {(light.object, light.kind, branch_lookups(table, variant, light)) for light in lights}
     return set(wired_lights(group)) == wanted
 

@@ -49,7 +49,7 @@ def capture(world: bpy.types.World, background: str) -> Environment:
         with _stage(copy) as scene:
             picture = _render(scene)
     # The threshold is one of the world as it shines now.
-    threshold = world.sun_threshold / strength if strength > 0.0 else 0.0
+    threshold = world.sun_threshold / (strength if strength > 0.0 else 1.0)
     return project(picture, sun_threshold=threshold)
 
 
