@@ -10,9 +10,9 @@ from types import ModuleType
 
 
 def _modules() -> tuple[ModuleType, ...]:
-    from . import ops, ops_model, panels, props
+    from . import ops, ops_measure, ops_model, panels, props
 
-    return props, ops, ops_model, panels
+    return props, ops, ops_model, ops_measure, panels
 
 
 def register() -> None:

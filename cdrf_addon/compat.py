@@ -74,6 +74,17 @@ def animation_curves(tree: bpy.types.ID, path: str) -> list[bpy.types.FCurve]:
     return [curve for curve in curves if curve.data_path == path]
 
 
+def walk_method(method: str) -> str:
+    """Name a subsurface method as the newest Blender does.
+
+    What was the random walk is called legacy since another took its name, with a longer reach.
+    """
+    node = bpy.types.ShaderNodeSubsurfaceScattering
+    known = {item.identifier for item in node.bl_rna.properties["falloff"].enum_items}
+    legacy = "RANDOM_WALK_LEGACY"
+    return legacy if method == "RANDOM_WALK" and legacy not in known else method
+
+
 def uses_nodes(material: bpy.types.Material | bpy.types.World) -> bool:
     """Tell whether the renderer looks at a material's or world's nodes; always so from 5.0 on."""
     if material.node_tree is None:

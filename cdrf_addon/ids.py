@@ -17,6 +17,7 @@ many modifiers make a mesh without them."""
 # --- node groups and images: all start with CDRF ------------------------------------------------
 PREFIX: Final = "CDRF"
 LUT_IMAGE: Final = "CDRF Reflectance Table"
+FIT_IMAGE: Final = "CDRF Fit"
 NODE: Final = "CDRF"
 OUTPUT_NODE: Final = "CDRF Output"
 DISPLAY_NODE: Final = "CDRF Curvature Display"

@@ -64,6 +64,9 @@ def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None
     row.operator_menu_enum("cdrf.set_model", "model", text=name, icon="SHADING_TEXTURE")
     row.operator_menu_enum("cdrf.preset", "preset", text="Preset", icon="PRESET")
     row.operator("cdrf.read_shader", text="", icon="EYEDROPPER")
+    row = layout.row(align=True)
+    row.operator("cdrf.measure", icon="RENDER_STILL")
+    row.operator("cdrf.fit", icon="GRAPH")
     if kind == PROFILE:
         column = layout.column()
         column.prop(material.cdrf, "profile", text="")

@@ -28,7 +28,7 @@ from ..core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS
 from .image import Table
 from .nodetree import TreeBuilder, declare, ensure_group
 
-VERSION = 4
+VERSION = 6
 
 ELLIPTIC = {"DISK", "ELLIPSE"}
 

@@ -13,7 +13,7 @@ from ..core.errors import SceneError
 from ..core.lut import DEFAULT_LAYOUT, build_lut
 from ..core.models import RING, SPHERE, Model, name_of, ring, sphere
 
-LUT_VERSION = 2
+LUT_VERSION = 4
 
 
 @dataclass(frozen=True)

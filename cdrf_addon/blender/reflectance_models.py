@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import bpy
 
 from .. import ids
+from ..compat import walk_method
 from ..core.detail import DETAIL_PER_SIGMA0
 from ..core.errors import ParameterError, SceneError
 from ..core.models import (
@@ -113,11 +114,26 @@ def has_colour(material: bpy.types.Material) -> bool:
 
 def set_scattering(material: bpy.types.Material, found: Scattering) -> None:
     """Take the scatter distances from what a Principled or Subsurface node says."""
-    factors = sigma0_per_radius(found.albedo, found.method)
+    factors = sigma0_per_radius(found.albedo, walk_method(found.method))
     sigma0 = [radius * float(factor) for radius, factor in zip(found.radius, factors, strict=True)]
+    set_channel_sigma0(material, sigma0)
+
+
+def channel_sigma0(material: bpy.types.Material) -> list[float]:
+    """Scatter distance of red, green and blue, whatever model the material has."""
+    moments = table_of(ensure_chosen(material)).moments
+    settings = material.cdrf
+    return [
+        settings.sigma0 * ratio * math.sqrt(moment)
+        for ratio, moment in zip(settings.sigma0_ratio, moments, strict=True)
+    ]
+
+
+def set_channel_sigma0(material: bpy.types.Material, sigma0: Sequence[float]) -> None:
+    """Set the scatter distance of each channel, for a model without colour."""
     largest = max(sigma0)
     material.cdrf.sigma0 = largest
-    material.cdrf.sigma0_ratio = [value / largest for value in sigma0]
+    material.cdrf.sigma0_ratio = [value / largest if largest > 0.0 else 1.0 for value in sigma0]
 
 
 def metres_of(scene: bpy.types.Scene) -> float:

@@ -20,3 +20,7 @@ class SceneError(CdrfError):
 
 class DependencyError(CdrfError):
     """A library the extension needs is not installed."""
+
+
+class MeasurementError(CdrfError):
+    """A measurement of path-traced spheres could not be made, read or used."""

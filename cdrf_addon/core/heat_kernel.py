@@ -28,15 +28,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .arguments import angle_and_width
+from .arguments import evaluate_forms
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 SERIES_FROM = 0.1
 SERIES_DEGREE = 82
-# Values at once in the series: 82 coefficients each, 13 MB.
-CHUNK = 20_000
 # cos(latitude) is only divided by where the line's heat has gone to nothing long before.
 LEAST_COSINE = 1e-3
 
@@ -56,15 +54,7 @@ def sphere_reflectance(theta: ArrayLike, sigma: ArrayLike) -> NDArray[np.float64
     Raises:
         ParameterError: theta is not finite, or sigma is negative or not a number.
     """
-    angle, width, shape = angle_and_width(theta, sigma)
-    result = np.maximum(np.cos(angle), 0.0)
-    narrow = (width > 0.0) & (width < SERIES_FROM)
-    result[narrow] = _near_lambert(angle[narrow], width[narrow])
-    wide = np.flatnonzero(width >= SERIES_FROM)
-    for start in range(0, len(wide), CHUNK):
-        some = wide[start : start + CHUNK]
-        result[some] = _series(angle[some], width[some])
-    return np.clip(result, 0.0, 1.0).reshape(shape)
+    return evaluate_forms(theta, sigma, SERIES_FROM, _near_lambert, _series)
 
 
 @cache
@@ -80,14 +70,21 @@ def lambert_coefficients(degree: int) -> NDArray[np.float64]:
 
 
 def _series(theta: NDArray[np.float64], sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-    from numpy.polynomial.legendre import legval
-
-    degree = np.arange(SERIES_DEGREE + 1.0)[:, None]
-    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-        damping = np.exp(-0.5 * degree * (degree + 1.0) * sigma**2)
-    damping[0] = 1.0  # 0 times infinity
-    coefficients = lambert_coefficients(SERIES_DEGREE)[:, None] * damping
-    return np.asarray(legval(np.cos(theta), coefficients, tensor=False))
+    """Sum the series; theta and sigma are broadcast in the sum alone."""
+    x = np.cos(theta)
+    before, legendre = np.ones_like(x), x
+    coefficients = lambert_coefficients(SERIES_DEGREE)
+    with np.errstate(over="ignore", under="ignore"):
+        time = 0.5 * sigma**2
+        total = np.asarray(coefficients[0] + coefficients[1] * np.exp(-2.0 * time) * x)
+        term = np.empty_like(total)
+        for l in range(2, SERIES_DEGREE + 1):  # noqa: E741  (the name of the literature)
+            # Bonnet's recurrence; of the odd terms only the first is not zero.
+            before, legendre = legendre, ((2 * l - 1) * x * legendre - (l - 1) * before) / l
+            if l % 2 == 0:
+                damped = coefficients[l] * np.exp(-l * (l + 1.0) * time)
+                total += np.multiply(damped, legendre, out=term)
+    return total
 
 
 def _near_lambert(theta: NDArray[np.float64], sigma: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -40,8 +40,8 @@ class LutLayout:
         ParameterError: The table is too small to hold an axis and its margin.
     """
 
-    width: int = 256
-    height: int = 128
+    width: int = 192
+    height: int = 192
 
     def __post_init__(self) -> None:
         if self.width < 4 * SEAM_TEXELS or self.height < 2:

@@ -17,7 +17,15 @@ import numpy as np
 
 from .errors import MeshError
 from .progress import run_steps
-from .topology import edge_pairs, face_normals, half_edges, runs_twice
+from .topology import (
+    columns,
+    edge_lengths,
+    edge_pairs,
+    face_normals,
+    half_edges,
+    has_repeats,
+    runs_twice,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -29,6 +37,8 @@ if TYPE_CHECKING:
 FLATNESS_LIMIT = 1e-6
 # A face this many times the median edge belongs to a vertex that has flown off.
 EDGE_LIMIT = 1e6
+# Three vertices of up to so many bits fit into one number.
+KEY_BITS = 21
 # Faces never meet at this angle: nothing is split.
 NO_CREASE = np.pi
 
@@ -159,18 +169,19 @@ def clean_steps(mesh: TriMesh, crease_angle: float = NO_CREASE) -> Generator[Non
         raise MeshError("The mesh has no vertices; give it some geometry first.")
     if not len(mesh.triangles):
         raise MeshError("The mesh has no faces, only loose vertices or edges; fill faces first.")
-    finite = np.isfinite(mesh.vertices).all(axis=1)
+    finite = np.isfinite(columns(mesh.vertices)).all(axis=0)
     vertices, triangles = _drop_non_finite(mesh, finite, report)
     yield
-    vertices, edge, lengths = _normalise(vertices, triangles)
+    vertices, edge, longest = _normalise(vertices, triangles)
     yield
-    triangles = _drop_unusable(vertices, triangles, lengths, report)
+    triangles = _drop_unusable(vertices, triangles, longest, report)
     yield
     welded, first = weld(vertices)
     report.welded_vertices = int(len(vertices) - len(first))
     yield
-    vertices = vertices[first]
-    triangles = _drop_duplicates(welded[triangles], len(vertices), report)
+    if report.welded_vertices:
+        vertices, triangles = vertices[first], welded[triangles]
+    triangles = _drop_duplicates(triangles, len(vertices), report)
     yield
     if not len(triangles):
         raise MeshError(
@@ -178,9 +189,10 @@ def clean_steps(mesh: TriMesh, crease_angle: float = NO_CREASE) -> Generator[Non
             + (" ".join(report.sentences()) or "all of them are degenerate.")
             + ") Clean it up with Mesh > Clean Up or Merge by Distance."
         )
-    used = np.zeros(len(vertices), dtype=bool)
-    used[triangles] = True
-    order = np.flatnonzero(used)[morton_order(vertices[used])]
+    used = _used(vertices, triangles)
+    order = morton_order(vertices if used.all() else vertices[used])
+    if len(order) < len(used):
+        order = np.flatnonzero(used)[order]
     place = np.full(len(vertices), -1, dtype=np.int64)
     place[order] = np.arange(len(order))
     yield
@@ -217,15 +229,18 @@ def weld(vertices: Points) -> tuple[Indices, Indices]:
         (n,) new index of each vertex, numbered by first appearance, and the index of the first
         vertex of each group.
     """
-    bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # + 0.0 turns -0.0 into 0.0
+    bits = columns(vertices + 0.0).view(np.uint64)  # + 0.0 turns -0.0 into 0.0
     # An odd multiplier per axis mixes 192 bits into 64; the comparison below catches a collision.
     with np.errstate(over="ignore"):
-        key = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)
-        key ^= (key >> np.uint64(29)) + bits[:, 1] * np.uint64(0xBF58476D1CE4E5B9)
-        key ^= (key >> np.uint64(31)) + bits[:, 2] * np.uint64(0x94D049BB133111EB)
+        key = bits[0] * np.uint64(0x9E3779B97F4A7C15)
+        key ^= (key >> np.uint64(29)) + bits[1] * np.uint64(0xBF58476D1CE4E5B9)
+        key ^= (key >> np.uint64(31)) + bits[2] * np.uint64(0x94D049BB133111EB)
+    if not has_repeats(key):
+        each = np.arange(len(key))
+        return each, each
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
-    if not np.array_equal(bits[first[group]], bits):
-        _, first, group = np.unique(bits, axis=0, return_index=True, return_inverse=True)
+    if not np.array_equal(bits[:, first[group]], bits):
+        _, first, group = np.unique(bits, axis=1, return_index=True, return_inverse=True)
         group = group.reshape(-1)
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -238,11 +253,11 @@ def morton_order(vertices: Points) -> Indices:
 
     Equal cells are ordered by position, so that the order depends on nothing else.
     """
-    low = vertices.min(axis=0)
-    span = max(float((vertices.max(axis=0) - low).max()), np.finfo(np.float64).tiny)
+    axes = columns(vertices)
+    span = max(float(np.ptp(axes, axis=1).max()), np.finfo(np.float64).tiny)
     code = np.zeros(len(vertices), dtype=np.uint64)
-    for axis in range(3):
-        cell = ((vertices[:, axis] - low[axis]) * ((2**21 - 1) / span)).astype(np.uint64)
+    for axis, values in enumerate(axes):
+        cell = ((values - values.min()) * ((2**21 - 1) / span)).astype(np.uint64)
         # Two zero bits between every two of the 21 bits.
         for shift, mask in (
             (32, 0x1F00000000FFFF),
@@ -256,7 +271,7 @@ def morton_order(vertices: Points) -> Indices:
     order = np.argsort(code)
     ranked = code[order]
     if (ranked[1:] == ranked[:-1]).any():
-        order = np.lexsort((*vertices.T, code))
+        order = np.lexsort((*axes, code))
     return order
 
 
@@ -275,55 +290,51 @@ def _drop_non_finite(
     return mesh.vertices[finite], (np.cumsum(finite) - 1)[triangles]
 
 
-def edge_lengths(vertices: Points, triangles: Indices) -> Points:
-    """Length of the three edges of each triangle, shape (3, m)."""
-    x, y, z = np.ascontiguousarray(vertices.T)
-    square = np.empty((3, len(triangles)))
-    for side in range(3):
-        tail, head = triangles[:, side], triangles[:, (side + 1) % 3]
-        square[side] = (
-            (x[tail] - x[head]) ** 2 + (y[tail] - y[head]) ** 2 + (z[tail] - z[head]) ** 2
-        )
-    return np.sqrt(square)
-
-
 def _normalise(vertices: Points, triangles: Indices) -> tuple[Points, float, Points]:
     """Centre the vertices and divide them by their median edge.
 
     Returns:
-        The vertices, the median edge, and the new lengths of all edges, (3, m).
+        The vertices, the median edge, and the new length of each face's longest edge, (m,).
     """
     # Two steps, so that neither 1e300 nor 1e-300 overflows a square on the way.
-    used = np.zeros(len(vertices), dtype=bool)
-    used[triangles] = True
-    centred = vertices * 0.5 - np.median(vertices[used], axis=0) * 0.5
-    reach = np.abs(centred).max(axis=1)
-    extent = float(np.median(reach[triangles].max(axis=1)))
+    axes, used = columns(vertices), _used(vertices, triangles)
+    middle = [np.median(axis[used], overwrite_input=True) for axis in axes]
+    centred = axes * 0.5 - np.stack(middle)[:, None] * 0.5
+    reach = np.abs(centred).max(axis=0)
+    a, b, c = columns(triangles)
+    of_face = np.maximum(np.maximum(reach[a], reach[b]), reach[c])
+    extent = float(np.median(of_face, overwrite_input=True))
     if not extent > 0.0:
-        extent = float(reach[triangles].max())
+        extent = float(of_face.max())
     if not extent > 0.0:
         raise MeshError("All faces shrink to one point; check the scale of the object.")
     with np.errstate(over="ignore"):
-        scaled = np.clip(centred / extent, -1e30, 1e30)
+        scaled = columns(np.clip(centred / extent, -1e30, 1e30))
     lengths = edge_lengths(scaled, triangles)
     positive = lengths[lengths > 0.0]
     if not len(positive):
         raise MeshError("All faces shrink to points; check the scale of the object.")
-    median = float(np.median(positive))
+    median = float(np.median(positive, overwrite_input=True))
     edge = median * extent * 2.0
     if not (np.isfinite(edge) and edge > np.finfo(np.float64).tiny):
         raise MeshError(
             f"Edges of {edge:.3g} units are outside what numbers can hold; "
             "check the scale of the object."
         )
-    return scaled / median, edge, lengths / median
+    return scaled / median, edge, lengths.max(axis=0) / median
+
+
+def _used(vertices: Points, triangles: Indices) -> NDArray[np.bool_]:
+    """Tell which vertices belong to a face, (n,)."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[triangles.ravel()] = True
+    return used
 
 
 def _drop_unusable(
-    vertices: Points, triangles: Indices, lengths: Points, report: CleaningReport
+    vertices: Points, triangles: Indices, longest: Points, report: CleaningReport
 ) -> Indices:
     """Drop faces that reach a vertex far away, and those without area."""
-    longest = lengths.max(axis=0)
     stray = longest > EDGE_LIMIT
     report.stray_faces = int(stray.sum())
     if stray.any():  # first, as their areas may be more than numbers can hold
@@ -343,14 +354,12 @@ def _drop_duplicates(triangles: Indices, count: int, report: CleaningReport) -> 
 def repeated_faces(triangles: Indices, count: int) -> NDArray[np.bool_]:
     """Tell which faces lie on the same three of `count` vertices as an earlier one, (m,)."""
     repeated = np.zeros(len(triangles), dtype=bool)
-    low, high = triangles.min(axis=1), triangles.max(axis=1)
-    middle = triangles.sum(axis=1) - low - high
-    if count < 2**21:
-        # One number a face; sorting tells at once that all are different, as they mostly are.
-        key = (low * count + middle) * count + high
-        ranked = np.sort(key)
-        if not (ranked[1:] == ranked[:-1]).any():
-            return repeated
+    a, b, c = columns(triangles)
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    middle = a + b + c - low - high
+    # One number a face tells at once that all are different, as they mostly are.
+    if count < 2**KEY_BITS and not has_repeats(_face_key(low, middle, high)):
+        return repeated
     order = np.lexsort((high, middle, low))
     ordered = np.stack((low, middle, high), axis=1)[order]
     # lexsort is stable, so the first of each run is the first in the mesh: it stays.
@@ -457,17 +466,24 @@ def _canonical_faces(triangles: Indices, count: int) -> Indices:
 
     So the last digit of every sum over faces is the same whatever the order they came in.
     """
-    a, b, c = triangles.T
+    a, b, c = columns(triangles)
     second, third = (b < a) & (b < c), (c < a) & (c < b)
-    turned = np.stack(
-        (
-            np.where(second, b, np.where(third, c, a)),
-            np.where(second, c, np.where(third, a, b)),
-            np.where(second, a, np.where(third, b, c)),
-        )
+    turned = (
+        np.where(second, b, np.where(third, c, a)),
+        np.where(second, c, np.where(third, a, b)),
+        np.where(second, a, np.where(third, b, c)),
     )
-    if count < 2**21:
-        order = np.argsort((turned[0] * count + turned[1]) * count + turned[2])
+    if count < 2**KEY_BITS:
+        # Numbers are sorted several times as fast as their order is found.
+        key = np.sort(_face_key(*turned))
+        below = 2**KEY_BITS - 1
+        turned = (key >> 2 * KEY_BITS, (key >> KEY_BITS) & below, key & below)
     else:
         order = np.lexsort(turned[::-1])
-    return np.ascontiguousarray(turned[:, order].T)
+        turned = tuple(corner[order] for corner in turned)
+    return np.stack(turned, axis=1)
+
+
+def _face_key(a: Indices, b: Indices, c: Indices) -> Indices:
+    """One number for each face of three vertices below 2^KEY_BITS, (m,)."""
+    return (a << 2 * KEY_BITS) | (b << KEY_BITS) | c

@@ -15,18 +15,22 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .arguments import checked
+from .energy import conserving
 from .errors import ParameterError
 from .heat_kernel import sphere_reflectance
 from .reflectance import reflectance
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from .measurement import SphereMeasurement
 
     Evaluate = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 
@@ -116,15 +120,15 @@ class Profile:
                 f"A profile has 1 to {MOST_GAUSSIANS} Gaussians, each with a width and the parts "
                 "of red, green and blue."
             )
-        numbers = np.array([*self.widths, *np.ravel(self.weights)], dtype=np.float64)
-        if len(numbers) != 4 * len(self.widths):
+        if any(len(parts) != 3 for parts in self.weights):
             raise ParameterError("Each Gaussian has a width and three parts: red, green and blue.")
+        numbers = np.column_stack((self.widths, self.weights)).astype(np.float64)
         if not np.isfinite(numbers).all() or (numbers < 0.0).any():
-            raise ParameterError("Widths and parts of a profile are numbers of 0 or more.")
+            raise ParameterError("Widths and parts of a profile are finite numbers of 0 or more.")
         if not max(self.widths) <= 1e30:
             raise ParameterError("A profile's widths end at 1e30.")
-        totals = np.sum(self.weights, axis=0)
-        for name, total in zip(("red", "green", "blue"), totals, strict=True):
+        for name, *parts in zip(("red", "green", "blue"), *self.weights, strict=True):
+            total = sum(parts)
             if abs(total - 1.0) > WEIGHT_TOLERANCE:
                 raise ParameterError(
                     f"The parts of {name} add up to {total:.4g}; they have to add up to 1."
@@ -142,7 +146,7 @@ class Profile:
     def to_text(self) -> str:
         """One line a Gaussian: width, then red, green and blue."""
         return "; ".join(
-            f"{width:.12g} " + " ".join(f"{part:.12g}" for part in parts)
+            f"{width:.7g} " + " ".join(f"{part:.7g}" for part in parts)
             for width, parts in zip(self.widths, self.weights, strict=True)
         )
 
@@ -196,19 +200,51 @@ def profile(shape: Profile = SKIN_PROFILE) -> Model:
     parts = np.array(shape.weights) / np.sum(shape.weights, axis=0)
 
     def evaluate(theta: ArrayLike, sigma: ArrayLike) -> NDArray[np.float64]:
-        blur = np.asarray(sigma, dtype=np.float64)
-        result = 0.0
-        for width, part in zip(widths, parts, strict=True):
-            # 0 times infinity is 0 here: what does not spread stays Lambert at any curvature.
-            own = blur * width if width > 0.0 else np.where(np.isnan(blur), blur, 0.0)
-            result = result + one(theta, own)[..., None] * part
-        return np.asarray(result)
+        _, blur = checked(theta, sigma)
+        blurred = []
+        for width in widths:
+            with np.errstate(over="ignore"):
+                # 0 times infinity is 0 here: what does not spread stays Lambert however curved.
+                own = blur * width if width > 0.0 else np.zeros_like(blur)
+            blurred.append(one(theta, own))
+        return np.stack(blurred, axis=-1) @ parts
 
     moments = (rms / reference) ** 2 if reference > 0.0 else np.ones(3)
-    key = f"{PROFILE} {_hash(shape.base, shape.widths, shape.weights)}"
+    key = f"{PROFILE} {_hash(shape.base, shape.to_text())}"
     red, green, blue = (float(moment) for moment in moments)
     return Model(PROFILE, key, evaluate, True, (red, green, blue))
 
 
-def _hash(*parts: str | Sequence[object]) -> str:
+def measured_model(
+    spheres: SphereMeasurement, radius: tuple[float, float, float], *, keep_energy: bool
+) -> tuple[Model, float]:
+    """What was measured on path-traced spheres, for channels of these scatter radii.
+
+    Args:
+        spheres: The measurement.
+        radius: Of red, green and blue, in any unit.
+        keep_energy: Divide by what a sphere gains over Lambert (core/energy.py): closer on bodies
+            that are not spheres, and no longer exact on those that are.
+
+    Returns:
+        The model, and the sigma0 that belongs to it, in the unit of the radii.
+    """
+    from .material_fit import sigma_per_scale
+    from .measured import MeasuredModel
+
+    slopes = [sigma_per_scale(spheres, channel) for channel in range(3)]
+    widest = int(np.argmax(radius))
+    table = MeasuredModel(spheres, radius, slopes[widest])
+    red, green, blue = (
+        float(ratio * slope / slopes[widest]) ** 2
+        for ratio, slope in zip(table.ratio, slopes, strict=True)
+    )
+    facts = [spheres.blender, spheres.method, spheres.seed, spheres.samples, keep_energy]
+    numbers = [float(number) for number in (*spheres.albedo, *table.ratio)]
+    key = f"{MEASURED} {_hash(str(facts), str(numbers))}"
+    evaluate = conserving(table.evaluate) if keep_energy else table.evaluate
+    return Model(MEASURED, key, evaluate, True, (red, green, blue)), max(radius) * slopes[widest]
+
+
+def _hash(*parts: str) -> str:
     return hashlib.blake2b(json.dumps(parts).encode(), digest_size=6).hexdigest()

@@ -59,15 +59,19 @@ def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels
     """
     mesh = curvature.mesh
     diffusion = Diffusion(mesh)
+    yield 0.0
     finest = diffusion.size() / LEVEL_RATIO**LEVELS
     k1, k2 = curvature.k1, curvature.k2
-    (mean,) = yield from portion(diffusion.steps((k1 + k2) / 2.0, [finest]), 0.0, 0.25)
-    (gaussian,) = yield from portion(diffusion.steps(k1 * k2, [finest]), 0.25, 0.5)
+    mean, gaussian = yield from portion(
+        diffusion.steps(((k1 + k2) / 2.0, k1 * k2), finest), 0.0, 0.5
+    )
     # Averages of two numbers' sum and product need not be those of two numbers; then k1 = k2.
     kappa = np.sqrt(np.maximum(2.0 * mean**2 - gaussian, mean**2))
     # With obtuse triangles a step is not quite an average, and may overshoot.
     kappa = np.minimum(kappa, np.sqrt((k1**2 + k2**2).max() / 2.0))
-    lengths = [finest * LEVEL_RATIO**level for level in range(1, LEVELS)]
-    fields = yield from portion(diffusion.steps(kappa, lengths), 0.5, 1.0)
-    columns = [mesh.to_source(values) / mesh.edge for values in (kappa, *fields)]
+    fields = [kappa]
+    for level in range(1, LEVELS):
+        steps = diffusion.steps([kappa], finest * LEVEL_RATIO**level, fields[-1:])
+        fields += yield from portion(steps, 0.3 + 0.2 * level, 0.5 + 0.2 * level)
+    columns = [mesh.to_source(values) / mesh.edge for values in fields]
     return KappaLevels(np.stack(columns, axis=1), mesh.to_source(finest, loose=1.0) * mesh.edge)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .curvature import CurvatureField
-from .mesh import CleaningReport, TriMesh, edge_lengths
+from .mesh import CleaningReport, TriMesh
+from .topology import edge_lengths
 
 if TYPE_CHECKING:
     from .mesh import Points

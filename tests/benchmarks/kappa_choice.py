@@ -320,8 +320,19 @@ def unit(vectors: Array) -> Array:
     return np.asarray(vectors / np.maximum(length, 1e-12))
 
 
+@dataclass(frozen=True)
+class Wax:
+    """A material of the references: scale of the radii RATIO, and one albedo for all channels."""
+
+    scale: float
+    albedo: float = ALBEDO
+
+
+WAXES = [Wax(scale) for scale in SCALES]
+
+
 def render_reference(
-    shape: Shape, scale: float, towards: Sequence[float], size: int, samples: int, bounces: int
+    shape: Shape, wax: Wax, towards: Sequence[float], size: int, samples: int, bounces: int
 ) -> Array:
     """Path-trace the shape; (size * size, 3), where 1 is a white surface facing the sun."""
     rig = Rig(ORTHO_SCALE)
@@ -348,9 +359,9 @@ def render_reference(
     tree.nodes.clear()
     scatter = tree.nodes.new("ShaderNodeSubsurfaceScattering")
     scatter.falloff = "RANDOM_WALK"
-    scatter.inputs["Color"].default_value = (ALBEDO,) * 3 + (1.0,)
+    scatter.inputs["Color"].default_value = (wax.albedo,) * 3 + (1.0,)
     scatter.inputs["Radius"].default_value = RATIO
-    scatter.inputs["Scale"].default_value = scale
+    scatter.inputs["Scale"].default_value = wax.scale
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(scatter.outputs["BSSRDF"], output.inputs["Surface"])
     item.data.materials.append(material)
@@ -369,6 +380,7 @@ class Case:
     """Unit direction towards the light along the surface."""
     reference: Array
     masks: dict[str, str]
+    albedo: float = ALBEDO
 
     def __post_init__(self) -> None:
         place = self.theta / math.pi * (THETA_NODES - 1)
@@ -389,7 +401,7 @@ class Case:
     def take(self, keep: NDArray[Any]) -> Case:
         """Choose pixels."""
         arrays = self.theta[keep], self.tangent[keep], self.reference[keep]
-        part = Case(self.shape, self.scale, self.hits.take(keep), *arrays, self.masks)
+        part = Case(self.shape, self.scale, self.hits.take(keep), *arrays, self.masks, self.albedo)
         part._rows = {kernel: rows[keep] for kernel, rows in self._rows.items()}
         return part
 
@@ -401,11 +413,11 @@ class Case:
         part = place - lower
         flat = lower + np.arange(len(rows)) * SIGMA_NODES
         values = rows.ravel()
-        return np.asarray(ALBEDO * (values[flat] * (1.0 - part) + values[flat + 1] * part))
+        return np.asarray(self.albedo * (values[flat] * (1.0 - part) + values[flat + 1] * part))
 
     def lambert(self) -> float:
         """RMSE without scattering, mean over R, G, B."""
-        off = ALBEDO * np.maximum(np.cos(self.theta), 0.0)[:, None] - self.reference
+        off = self.albedo * np.maximum(np.cos(self.theta), 0.0)[:, None] - self.reference
         return float(np.sqrt((off**2).mean(axis=0)).mean())
 
     def error(self, kernel: str, channel: int, sigma: Array) -> float:
@@ -415,7 +427,12 @@ class Case:
 
 
 def make_cases(
-    shape: Shape, cache: Path, size: int, samples: int, bounces: int = BOUNCES
+    shape: Shape,
+    cache: Path,
+    size: int,
+    samples: int,
+    bounces: int = BOUNCES,
+    waxes: Sequence[Wax] = WAXES,
 ) -> list[Case]:
     """Render what is not in the cache yet, and mask out what no local shading can know."""
     hits = cast_camera(shape, size)
@@ -426,15 +443,16 @@ def make_cases(
     if len(rim):
         near_rim = cKDTree(rim).query(hits.position)[0] < OPEN_MARGIN
     cases = []
-    for scale in SCALES:
+    for wax in waxes:
         parts: list[tuple[Any, ...]] = []
         masks = {}
         for label, direction in LIGHTS.items():
             light = np.array(direction) / np.linalg.norm(direction)
-            key = f"{shape.name}-{scale:g}-{label}-{size}-{samples}-{bounces}.npz"
+            colour = "" if wax.albedo == ALBEDO else f"-{wax.albedo:g}"
+            key = f"{shape.name}-{wax.scale:g}{colour}-{label}-{size}-{samples}-{bounces}.npz"
             if not (cache / key).exists():
                 start = time.perf_counter()
-                picture = render_reference(shape, scale, tuple(light), size, samples, bounces)
+                picture = render_reference(shape, wax, tuple(light), size, samples, bounces)
                 np.savez_compressed(cache / key, picture=picture.astype(np.float32))
                 print(f"  {key}: {time.perf_counter() - start:.0f} s", flush=True)
             picture = np.load(cache / key)["picture"].astype(np.float64)
@@ -454,8 +472,8 @@ def make_cases(
             angle = np.arccos(np.clip(cosine[keep], -1.0, 1.0))
             parts.append((keep, angle, across, picture[hits.pixel[keep]]))
         chosen, theta, tangent, reference = map(np.concatenate, zip(*parts, strict=True))
-        case = Case(shape.name, scale, hits.take(chosen), theta, tangent, reference, masks)
-        cases.append(case)
+        pixels = hits.take(chosen), theta, tangent, reference
+        cases.append(Case(shape.name, wax.scale, *pixels, masks, wax.albedo))
     return cases
 
 

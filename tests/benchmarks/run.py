@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Error against run time: writes docs/benchmarks.md and docs/benchmarks.json.
+"""Run time of the operator and of a draw: writes docs/benchmarks.md and docs/benchmarks.json.
 
     ./dev python tests/benchmarks/run.py            everything, about ten minutes on two cores
-    ./dev python tests/benchmarks/run.py --only lut setup frame
+    ./dev python tests/benchmarks/run.py --only setup frame
 
-Timings are CPU seconds of this process. Draws are given as ratios too, as those of a software
-rasteriser mean little by themselves; they need Blender 5.2.
+Timings are seconds on the clock. Draws are given as ratios too, as those of a software rasteriser
+mean little by themselves; they need Blender 5.2. The look-up table has its own, lut.py.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import json
 import sys
 import time
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,52 +31,10 @@ from surfaces import ALL_SURFACES, Surface  # noqa: E402
 
 from cdrf_addon import register, unregister  # noqa: E402
 from cdrf_addon.compat import ensure_node_tree  # noqa: E402
-from cdrf_addon.core.heat_kernel import sphere_reflectance  # noqa: E402
-from cdrf_addon.core.lut import LutLayout, build_lut, sample_lut  # noqa: E402
-from cdrf_addon.core.models import sphere  # noqa: E402
 
-SEED = 20111106
 DRAWS = 15
 DRAW_PIXELS = 1024
 Rows = list[list[Any]]
-
-
-def seconds_of(call: Callable[[], Any], repeat: int = 3) -> float:
-    """Least CPU time of a few runs."""
-    times = []
-    for _ in range(repeat):
-        start = time.process_time()
-        call()
-        times.append(time.process_time() - start)
-    return min(times)
-
-
-def bench_lut() -> tuple[str, list[str], Rows]:
-    """Size and storage of the table against its error, with the shader's mapping and filter."""
-    rng = np.random.default_rng(SEED)
-    count = 200_000
-    near = np.sign(rng.uniform(-1, 1, count)) * 10 ** rng.uniform(-7, 0, count)
-    cosine = np.concatenate((rng.uniform(-1, 1, count), near))
-    sigma = np.concatenate((10 ** rng.uniform(-4, 1.5, count), rng.uniform(0, 3, count)))
-    exact = sphere_reflectance(np.arccos(cosine), sigma)
-    rows: Rows = []
-    for width, height in ((64, 32), (128, 64), (256, 128), (512, 256), (1024, 512)):
-        layout = LutLayout(width, height)
-        table = build_lut(sphere(), layout)
-        spent = seconds_of(partial(build_lut, sphere(), layout))
-        for storage in ("float", "half"):
-            stored = table if storage == "float" else table.astype(np.float16).astype(np.float32)
-            error = np.abs(sample_lut(stored, cosine, sigma**2, layout) - exact)
-            size = width * height * 4 * (4 if storage == "float" else 2) / 1024
-            rms = float(np.sqrt((error**2).mean()))
-            chosen = "**chosen**" if (width, storage) == (256, "float") else ""
-            row = [f"{width} x {height}", storage, f"{error.max():.1e}", f"{rms:.1e}"]
-            rows.append([*row, f"{spent * 1e3:.0f}", f"{size:.0f}", chosen])
-    return (
-        "Look-up table: size and storage against error",
-        ["texels", "storage", "worst error", "RMS error", "CPU ms to make", "KiB", ""],
-        rows,
-    )
 
 
 def bench_setup() -> tuple[str, list[str], Rows]:
@@ -255,7 +212,6 @@ def bench_frame() -> tuple[str, list[str], Rows]:
 
 
 BENCHES = {
-    "lut": bench_lut,
     "setup": bench_setup,
     "frame": bench_frame,
 }

@@ -11,6 +11,10 @@ import pytest
 HANDLERS = ("depsgraph_update_post", "load_post", "undo_post", "redo_post")
 
 
+OPERATORS = ["fit", "measure", "preset", "read_shader", "remove", "save_curvature", "set_model"]
+OPERATORS += ["setup", "show_curvature", "update"]
+
+
 def traces() -> dict[str, Any]:
     return {
         "operators": sorted(dir(bpy.ops.cdrf)),
@@ -29,7 +33,7 @@ def traces() -> dict[str, Any]:
 @pytest.mark.smoke
 def test_enable_disable_enable(_enabled: None) -> None:
     with_it = traces()
-    assert with_it["operators"] == ["remove", "save_curvature", "setup", "show_curvature", "update"]
+    assert with_it["operators"] == OPERATORS
     assert with_it["material"] and with_it["mesh"] and len(with_it["handlers"]) == 4
     bpy.ops.preferences.addon_disable(module="cdrf_addon")
     gone = traces()

@@ -7,6 +7,7 @@ On the unit sphere a step of length l multiplies a spherical harmonic of degree 
 
 from __future__ import annotations
 
+import igl
 import numpy as np
 import pytest
 from scipy.sparse import diags_array
@@ -45,8 +46,9 @@ def ball(level: int, stretch: float = 1.0) -> tuple[CleanMesh, np.ndarray]:
 
 
 def step(mesh: CleanMesh, values: np.ndarray, *lengths: float) -> list[np.ndarray]:
+    diffusion = Diffusion(mesh)
     inside = [np.full(len(values), length / mesh.edge) for length in lengths]
-    return run_steps(Diffusion(mesh).steps(values, inside))
+    return [run_steps(diffusion.steps([values], length))[0] for length in inside]
 
 
 @pytest.mark.smoke
@@ -104,6 +106,26 @@ def test_a_step_solves_the_implicit_equation() -> None:
         exact = spsolve(system.tocsc(), level.areas * noisy)
         found = step(mesh, noisy, length * mesh.edge)[0]
         assert np.abs(found - exact).max() <= 2e-3 * np.ptp(exact)
+
+
+def test_the_weights_are_those_of_libigl() -> None:
+    mesh, _ = ball(3, stretch=0.3)
+    weights = Diffusion(mesh)._fine.weights
+    theirs = igl.cotmatrix(mesh.vertices, mesh.triangles)
+    theirs.setdiag(0.0)
+    assert np.abs((weights - theirs).toarray()).max() <= 1e-12
+
+
+def test_the_start_does_not_matter() -> None:
+    mesh, z = ball(4)
+    noisy = z + np.random.default_rng(9).normal(size=len(z))
+    length = np.full(len(z), 0.3 / mesh.edge)
+    usual, wrong, zero = (
+        run_steps(Diffusion(mesh).steps([noisy], length, [start]))[0]
+        for start in (noisy, 1e3 * noisy[::-1], np.zeros(len(z)))
+    )
+    for found in (wrong, zero):
+        assert np.abs(found - usual).max() <= 1e-4 * usual.std()
 
 
 def test_a_coarse_mesh_is_as_good(monkeypatch) -> None:

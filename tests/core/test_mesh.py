@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import ArrayLike
 
 from cdrf_addon.core.errors import MeshError
-from cdrf_addon.core.mesh import EDGE_LIMIT, CleanMesh, TriMesh, clean, edge_lengths, weld
+from cdrf_addon.core.mesh import EDGE_LIMIT, CleanMesh, TriMesh, clean, weld
+from cdrf_addon.core.topology import edge_lengths
 
 TOLERANCE = {
     # Normalised coordinates are of size 1 to 100 and see four roundings of 1.1e-16.

@@ -11,6 +11,9 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from references import ANGLES as MANY_ANGLES
+from references import SIGMAS as LISTED
+from references import reference_error, ring_reference
 
 from cdrf_addon.core.errors import CdrfError, ParameterError
 from cdrf_addon.core.reflectance import SERIES_FROM, reflectance, series_remainder
@@ -97,6 +100,12 @@ def test_the_value_is_the_series(sigma: float) -> None:
     error = np.abs(reflectance(ANGLES, sigma) - exact).max()
     assert error <= TOLERANCE["promised"]
     assert error <= TOLERANCE["documented"]
+
+
+@pytest.mark.parametrize("sigma", LISTED)
+def test_the_value_at_1001_angles(sigma: float) -> None:
+    error = np.abs(reflectance(MANY_ANGLES, sigma) - ring_reference(MANY_ANGLES, sigma)).max()
+    assert error <= TOLERANCE["promised"] + reference_error(sigma)
 
 
 def test_no_blur_is_lambert_to_the_last_bit() -> None:

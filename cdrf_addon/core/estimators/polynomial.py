@@ -11,8 +11,9 @@ curvatures depend on the order of the vertices, as it symmetrises the Weingarten
 it is taken from both fundamental forms, so that the frame, and with it the order, cancels out.
 
 All vertices of a block are fitted at once: every entry of their normal equations is a sum over the
-rings of x^p y^q, possibly times z. numpy lets go of the interpreter lock in these sums, so blocks
-run on as many threads as there are cores.
+rings of x^p y^q, possibly times z. Arrays of pairs are (r, b): a column for each of b vertices, a
+row for each of its r neighbours, so that a sum adds up whole rows. numpy lets go of the interpreter
+lock in these sums, so blocks run on as many threads as there are cores.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..progress import portion
-from ..topology import NORMAL_LIMIT, adjacency, vertex_normals
+from ..topology import NORMAL_LIMIT, adjacency, columns, dot, vertex_normals
 from .estimate import Estimate, fittable_faces
 from .least_squares import PIVOT_LIMIT, solve
 from .tensor import tensor_steps
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
     from ..mesh import CleanMesh, Indices, Points
 
 Exponents = tuple[int, int]
-_Block = tuple[int, int, Estimate, "NDArray[np.bool_]"]
-"""First vertex, end, result, and which vertices' rings are much longer than wide."""
+_Block = tuple["Indices", Estimate, "NDArray[np.bool_]"]
+"""Vertices, result, and which vertices' rings are much longer than wide."""
 
 QUADRIC: tuple[Exponents, ...] = ((2, 0), (1, 1), (0, 2), (1, 0), (0, 1))
 CUBIC: tuple[Exponents, ...] = (*QUADRIC, (3, 0), (2, 1), (1, 2), (0, 3))
@@ -46,6 +47,8 @@ GOLDFEATHER: tuple[Exponents, ...] = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1
 
 # Pairs of a vertex and a neighbour in a block: their arrays just fit into a core's cache.
 BLOCK_PAIRS = 60_000
+# Rings are made for so many blocks at once, as every product of sparse matrices costs a pass over
+# all columns.
 BLOCKS_AT_ONCE = 16
 # A cubic that is hardly determined swings wildly; there the quadric takes over.
 CUBIC_PIVOT_LIMIT = 1e-3
@@ -85,15 +88,18 @@ def polynomial_steps(
     long = np.zeros(count, dtype=bool)
     running: deque[Future[_Block]] = deque()
 
+    fitted = 0
+
     def store(done: Future[_Block]) -> float:
-        start, end, part, part_long = done.result()
-        result.put(slice(start, end), part)
-        long[start:end] = part_long
-        return 0.06 + 0.84 * end / count
+        nonlocal fitted
+        rows, part, long[rows] = done.result()
+        result.put(rows, part)
+        fitted += len(rows)
+        return 0.06 + 0.84 * min(fitted / count, 1.0)
 
     with ThreadPoolExecutor(workers) as pool:
-        for start, rings in _ring_blocks(near, radius):
-            running.append(pool.submit(fit.block, start, rings))
+        for rows, rings in _ring_blocks(near, radius):
+            running.append(pool.submit(fit.block, rows, rings))
             while len(running) > 2 * workers:
                 yield store(running.popleft())
         while running:
@@ -106,22 +112,35 @@ def polynomial_steps(
     return result
 
 
-def _ring_blocks(near: Any, radius: int) -> Generator[tuple[int, Any], None, None]:
-    """Cut the mesh into blocks: the first vertex of each, and a row of neighbours for each vertex.
+def _ring_blocks(near: Any, radius: int) -> Generator[tuple[Indices, Indices], None, None]:
+    """Cut the mesh into blocks: some vertices, (b,), and the neighbours of each, (r, b).
 
-    Rings are made for many blocks at once, as every product of sparse matrices costs a pass over
-    all columns.
+    Those with the most neighbours come first; where others in the block have fewer, -1 follows.
     """
     count = near.shape[0]
     # Rings grow with the square of the radius: 7, 19, 37, 61 points on a regular mesh.
     per_vertex = max(1, round(near.nnz / count * (1 + radius) * radius / 2))
-    size = max(64, BLOCK_PAIRS // per_vertex)
-    for first in range(0, count, BLOCKS_AT_ONCE * size):
-        rings = near[first : first + BLOCKS_AT_ONCE * size]
+    size = BLOCKS_AT_ONCE * max(64, BLOCK_PAIRS // per_vertex)
+    for first in range(0, count, size):
+        rings = near[first : first + size]
         for _ in range(radius - 1):
             rings = rings @ near
-        for start in range(0, rings.shape[0], size):
-            yield first + start, rings[start : start + size]
+        sizes, indices = np.diff(rings.indptr), rings.indices.astype(np.int64)
+        order = np.argsort(-sizes, kind="stable")
+        start = 0
+        while start < len(order):
+            most = int(sizes[order[start]])
+            chosen = order[start : start + max(64, BLOCK_PAIRS // most)]
+            start += len(chosen)
+            if len(chosen) == 1:
+                # Twice, as numpy adds up a single column in another order.
+                chosen = np.repeat(chosen, 2)
+            row = np.arange(most)[:, None]
+            # Padding may reach beyond the last neighbour.
+            neighbours = np.take(indices, rings.indptr[chosen] + row, mode="clip")
+            if sizes[chosen[-1]] < most:
+                neighbours[row >= sizes[chosen]] = -1
+            yield first + chosen, neighbours
 
 
 class _Fit:
@@ -133,39 +152,36 @@ class _Fit:
         terms: tuple[Exponents, ...],
         use_normals: bool,
     ) -> None:
-        self.vertices, self.normals, self.sound = vertices, normals, sound
-        self.terms, self.use_normals = terms, use_normals
-        self.columns = [np.ascontiguousarray(part) for part in (*vertices.T, *normals.T)]
+        self.sound, self.terms, self.use_normals = sound, terms, use_normals
+        self.places, self.normals = columns(vertices), columns(normals)
 
     # Rings too small for their powers to be held come out as NaN, which `solve` takes for unsolved.
     @np.errstate(divide="ignore", invalid="ignore", over="ignore", under="ignore")
-    def block(self, start: int, rings: Any) -> _Block:
-        """Fit around the vertices from start on, a row of neighbours each."""
-        end = start + rings.shape[0]
-        pairs = _Pairs(rings, self.vertices, self.normals, self.columns, start)
+    def block(self, rows: Indices, rings: Indices) -> _Block:
+        """Fit around some vertices, (b,), with the neighbours of each, (r, b)."""
+        pairs = _Pairs(rows, rings, self.places, self.normals)
         k1, k2, solved = self._curvatures(pairs, self.terms)
         if len(self.terms) > len(QUADRIC) and not solved.all():
             # Too few neighbours for a cubic, or on one side only, may be enough for a quadric.
             other1, other2, other = self._curvatures(pairs, QUADRIC)
             k1, k2 = np.where(solved, k1, other1), np.where(solved, k2, other2)
             solved |= other
-        good = self.sound[start:end] & pairs.has_normal & solved & (pairs.count >= 5.0)
-        return start, end, Estimate(k1, k2, good), pairs.long
+        good = self.sound[rows] & pairs.has_normal & solved & (pairs.count >= 5.0)
+        return rows, Estimate(k1, k2, good), pairs.long
 
     def _curvatures(
         self, pairs: _Pairs, terms: Sequence[Exponents]
     ) -> tuple[Points, Points, NDArray[np.bool_]]:
         limit = CUBIC_PIVOT_LIMIT if len(terms) > len(QUADRIC) else PIVOT_LIMIT
         solution, solved = solve(*self._equations(pairs, terms), limit)
-        of = {
-            (p, q): value / (pairs.wide**p * pairs.high**q)
-            for (p, q), value in zip(terms, solution, strict=True)
-        }
+        of = dict(zip(terms, solution, strict=True))
+        wide, high = pairs.wide, pairs.high
         flat = np.zeros(len(solved))
-        slope = of.get((1, 0), flat), of.get((0, 1), flat)
+        slope = of.get((1, 0), flat) / wide, of.get((0, 1), flat) / high
+        bend = of[2, 0] / wide**2, of[1, 1] / (wide * high), of[0, 2] / high**2
         if len(terms) > len(QUADRIC):
             solved &= ~pairs.one_sided
-        return *_principal(*slope, *(of[term] for term in ((2, 0), (1, 1), (0, 2)))), solved
+        return *_principal(*slope, *bend), solved
 
     def _equations(
         self, pairs: _Pairs, terms: Sequence[Exponents]
@@ -192,99 +208,87 @@ class _Fit:
 class _Pairs:
     """Neighbours of a block's vertices in each vertex's own frame, and sums over them."""
 
-    def __init__(
-        self, rings: Any, vertices: Points, normals: Points, columns: list[Points], start: int
-    ) -> None:
-        neighbour = rings.indices
-        self.starts: Indices = rings.indptr[:-1]
-        self._sizes = np.diff(rings.indptr)
-        mean = rings.astype(np.float64) @ normals
-        length = np.sqrt((mean**2).sum(axis=1))
-        self.has_normal = length > NORMAL_LIMIT * self._sizes
-        mean /= np.where(self.has_normal, length, 1.0)[:, None]
-        self._frame = np.concatenate((*_tangents(mean.T), mean.T))
-        itself = vertices[start : start + len(self._sizes)].T
-        around = np.repeat(np.concatenate((self._frame, itself)), self._sizes, axis=1)
-        ux, uy, uz, vx, vy, vz, nx, ny, nz, x, y, z = around
+    def __init__(self, rows: Indices, rings: Indices, places: Points, normals: Points) -> None:
         # mode="clip" skips the check of every index: three times as fast.
-        dx, dy, dz = (
-            np.take(part, neighbour, mode="clip") - own
-            for part, own in zip(columns[:3], (x, y, z), strict=True)
-        )
-        a, b, c = self._turned = [np.take(part, neighbour, mode="clip") for part in columns[3:]]
-        # A neighbour that looks the other way lies on another sheet.
-        self._up = nx * a + ny * b + nz * c
+        self._turned = [np.take(axis, rings, mode="clip") for axis in normals]
+        inside = rings >= 0
+        size = inside.sum(axis=0)
+        if not inside.all():
+            self._turned = [axis * inside for axis in self._turned]
+        mean = np.stack([axis.sum(axis=0) for axis in self._turned])
+        length = np.sqrt(dot(mean, mean))
+        self.has_normal = length > NORMAL_LIMIT * size
+        mean /= np.where(self.has_normal, length, 1.0)
+        self._frame = [*_tangents(mean), mean]
+        # A neighbour that looks the other way lies on another sheet; padding looks nowhere.
+        self._up = dot(mean, self._turned)
         self._same = same = (self._up > 0.0).astype(np.float64)
-        self._x = (dx * ux + dy * uy + dz * uz) * same
-        self._y = (dx * vx + dy * vy + dz * vz) * same
-        height = (dx * nx + dy * ny + dz * nz) * same
-        self.count = np.add.reduceat(same, self.starts) - 1.0
-        self._targets = {"": None, "z": height}
-        self._powers: dict[Exponents, Points] = {}
-        self._moments: dict[tuple[int, int, str], Points] = {}
-        self.wide = self.high = np.ones(len(self.count))
+        away = [np.take(axis, rings, mode="clip") - axis[rows] for axis in places]
+        self._x, self._y, height = (dot(axis, away) * same for axis in self._frame)
+        self.count = same.sum(axis=0) - 1.0
+        self._targets = {"z": height}
         self._align()
+        self._x /= self.wide
+        self._y /= self.high
+        self._powers = {(0, 0): same, (1, 0): self._x, (0, 1): self._y}
+        self._moments: dict[tuple[int, int, str], Points] = {}
 
     def _align(self) -> None:
-        """Set the units of x and y; turn the axes where the rings are much longer than wide."""
+        """Choose the units of x and y; turn the axes where the rings are much longer than wide."""
         number = np.maximum(self.count, 1.0)
-        xx, xy, yy = (self.moment(p, q) / number for p, q in ((2, 0), (1, 1), (0, 2)))
+        x, y = self._x, self._y
+        xx, xy, yy = (_sum(*both) / number for both in ((x, x), (x, y), (y, y)))
         middle, half = (xx + yy) / 2.0, np.hypot((xx - yy) / 2.0, xy)
-        off_centre = (self.moment(1, 0) / number) ** 2 + (self.moment(0, 1) / number) ** 2
+        off_centre = (_sum(x) / number) ** 2 + (_sum(y) / number) ** 2
         self.one_sided = off_centre > ONE_SIDED * 2.0 * middle
         self.long = long = middle - half < ELONGATED * (middle + half)
         if not long.any():
             self.wide = self.high = np.where(middle > 0.0, np.sqrt(middle), 1.0)
-        else:
-            angle = np.where(long, 0.5 * np.arctan2(2.0 * xy, xx - yy), 0.0)
-            turn = np.stack((np.cos(angle), np.sin(angle)))
-            cosine, sine = np.repeat(turn, self._sizes, axis=1)
-            self._x, self._y = cosine * self._x + sine * self._y, cosine * self._y - sine * self._x
-            u, v = self._frame[:3].copy(), self._frame[3:6].copy()
-            self._frame[:3] = turn[0] * u + turn[1] * v
-            self._frame[3:6] = turn[0] * v - turn[1] * u
-            self._powers.clear()
-            self._moments.clear()
-            xx, yy = (self.moment(*of) / number for of in ((2, 0), (0, 2)))
-            xx, yy = np.where(long, xx, middle), np.where(long, yy, middle)
-            self.wide = np.where(xx > 0.0, np.sqrt(xx), 1.0)
-            self.high = np.where(yy > 0.0, np.sqrt(yy), 1.0)
-        self._moments.clear()
+            return
+        angle = np.where(long, 0.5 * np.arctan2(2.0 * xy, xx - yy), 0.0)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        self._x, self._y = x, y = cosine * x + sine * y, cosine * y - sine * x
+        u, v = self._frame[:2]
+        self._frame[:2] = cosine * u + sine * v, cosine * v - sine * u
+        xx = np.where(long, _sum(x, x) / number, middle)
+        yy = np.where(long, _sum(y, y) / number, middle)
+        self.wide = np.where(xx > 0.0, np.sqrt(xx), 1.0)
+        self.high = np.where(yy > 0.0, np.sqrt(yy), 1.0)
 
     def moment(self, p: int, q: int, target: str = "") -> Points:
         """Sum of x^p y^q over the rings, times the target; x and y in their units."""
         known = self._moments.get((p, q, target))
         if known is None:
-            values = self._power(p, q)
             if target:
-                values = values * self._target(target)
-            known = np.add.reduceat(values, self.starts) / (self.wide**p * self.high**q)
+                known = _sum(self._power(p, q), self._target(target))
+            elif p + q <= 3:
+                known = _sum(self._power(p, q))
+            else:
+                # Powers above the third order are made while they are added up.
+                r = min(p, 3)
+                s = 3 - r
+                known = _sum(self._power(r, s), self._power(p - r, q - s))
             self._moments[p, q, target] = known
         return known
 
     def _power(self, p: int, q: int) -> Points:
         known = self._powers.get((p, q))
         if known is None:
-            if p + q == 0:
-                known = self._same
-            elif p:
-                known = self._power(p - 1, q) * self._x if (p, q) != (1, 0) else self._x
-            else:
-                known = self._power(0, q - 1) * self._y if q != 1 else self._y
+            known = self._power(p - 1, q) * self._x if p else self._power(0, q - 1) * self._y
             self._powers[p, q] = known
         return known
 
     def _target(self, name: str) -> Points:
-        known = self._targets.get(name)
-        if known is None:
-            ux, uy, uz, vx, vy, vz = np.repeat(self._frame[:6], self._sizes, axis=1)
-            a, b, c = self._turned
+        if name not in self._targets:
             up = np.maximum(self._up, 0.1)  # slopes of up to 84 degrees
-            self._targets["along x"] = -(ux * a + uy * b + uz * c) / up * self._same
-            self._targets["along y"] = -(vx * a + vy * b + vz * c) / up * self._same
-            known = self._targets[name]
-        assert known is not None
-        return known
+            for direction, axis in zip(("along x", "along y"), self._frame, strict=False):
+                self._targets[direction] = -dot(axis, self._turned) / up * self._same
+        return self._targets[name]
+
+
+def _sum(values: Points, times: Points | None = None) -> Points:
+    """Sum an array of pairs, or the product of two, over the neighbours, (b,)."""
+    return values.sum(axis=0) if times is None else np.einsum("rb,rb->b", values, times)
 
 
 def _tangents(normal: Points) -> tuple[Points, Points]:

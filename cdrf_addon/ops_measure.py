@@ -1,0 +1,329 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that path-trace spheres of a material: Measure makes a table of them, Fit fits sigma0.
+
+The path tracing runs in a Blender of its own (measure.py), so the window stays alive and nothing is
+changed before the end. What was measured once is kept on disk.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import bpy
+from bpy.props import EnumProperty, FloatVectorProperty, IntProperty, StringProperty
+
+from . import ids
+from .blender import reflectance_models
+from .blender.fit_picture import make_picture, picture_path, show_picture
+from .blender.image import ensure_table
+from .blender.materials import active_skin, cdrf_node
+from .blender.read_material import Scattering, read_scattering
+from .compat import walk_method
+from .core.errors import CdrfError, ParameterError, SceneError
+from .core.material_fit import MaterialFit, fit_material, sigma0_at
+from .core.measured import MeasuredModel
+from .core.measurement import SphereMeasurement
+from .core.models import RING, SPHERE, measured_model
+from .core.progress import in_words, run_steps
+from .core.scattering import BURLEY, sigma0_per_radius
+from .core.summary import CONSTANT
+from .measure import (
+    DEFAULT_QUALITY,
+    POLL_SECONDS,
+    RANDOM_WALK,
+    Request,
+    cache_folder,
+    measure_steps,
+)
+
+Colour = tuple[float, float, float]
+TICK_SECONDS = 0.1
+# Cycles has no albedo of 0 to measure.
+LEAST_ALBEDO = 1e-3
+# Shown in the picture where nothing is known of the object.
+MIDDLE_SCALE = 0.25
+QUALITY_ITEMS = (
+    ("preview", "Preview", "A quarter of the default's time; shows which way it goes"),
+    ("default", "Default", "About a minute on two cores"),
+    ("fine", "Fine", "Half the noise of the default, in four times its time"),
+)
+
+
+class _PathTraced(bpy.types.Operator):
+    """Measures the active material behind a progress bar; never registered itself."""
+
+    _steps: Generator[tuple[float, str], None, Any]
+    _timer: bpy.types.Timer
+    _start: float
+    _skin: str
+    _round: bool
+    SETTINGS: tuple[str, ...] = ("albedo", "radius", "quality", "seed")
+
+    albedo: FloatVectorProperty(
+        name="Albedo",
+        description="Colour of the material in white light, taken from its nodes",
+        subtype="COLOR",
+        size=3,
+        default=(0.8, 0.8, 0.8),
+        min=0.0,
+        max=1.0,
+    )
+    radius: FloatVectorProperty(
+        name="Scatter Radius R, G, B",
+        description=(
+            "Radius times Scale of Blender's subsurface scattering, for red, green and blue, taken "
+            "from the material's nodes; without such nodes from its scatter distance"
+        ),
+        unit="LENGTH",
+        size=3,
+        default=(0.01, 0.01, 0.01),
+        min=0.0,
+        precision=4,
+    )
+    quality: EnumProperty(
+        name="Quality",
+        description="How long Cycles may take, against how much noise is left",
+        items=QUALITY_ITEMS,
+        default=DEFAULT_QUALITY,
+    )
+    seed: IntProperty(
+        name="Seed",
+        description="Another number gives other noise of the same size",
+        default=0,
+        min=0,
+        max=2**31 - 1,
+    )
+
+    method: StringProperty(default=RANDOM_WALK, options={"HIDDEN", "SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        skin = active_skin(context.object)
+        if skin is None:
+            cls.poll_message_set("Make the object translucent first")
+            return False
+        if not skin.is_editable:
+            cls.poll_message_set("The material is linked from another file: make it local first")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        skin = active_skin(context.object)
+        assert skin is not None
+        own = own_scattering(skin)
+        self.albedo, self.radius, self.method = own.albedo, own.radius, own.method
+        return context.window_manager.invoke_props_dialog(self, width=360)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        for name in self.SETTINGS:
+            layout.prop(self, name)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        skin = active_skin(context.object)
+        assert skin is not None
+        self._skin = skin.name
+        self._round = context.object.data.cdrf.kind == CONSTANT
+        try:
+            self._steps = self._work(self._request())
+            if context.window is None or bpy.app.background:
+                return self._finish(context, run_steps(self._steps))
+        except CdrfError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self._start = time.monotonic()
+        manager = context.window_manager
+        manager.progress_begin(0.0, 1.0)
+        self._timer = manager.event_timer_add(TICK_SECONDS, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == "ESC":
+            self._leave_modal(context)
+            self.report({"WARNING"}, "Stopped; nothing was changed.")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            # The path tracing is elsewhere: the artist goes on working.
+            return {"PASS_THROUGH"}
+        try:
+            part, what = next(self._steps)
+        except StopIteration as end:
+            self._leave_modal(context)
+            try:
+                return self._finish(context, end.value)
+            except CdrfError as error:
+                self.report({"ERROR"}, str(error))
+                return {"CANCELLED"}
+        except CdrfError as error:
+            self._leave_modal(context)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        context.window_manager.progress_update(part)
+        far = in_words(part, time.monotonic() - self._start)
+        context.workspace.status_text_set(f"CDRF: {what}, {far}   (Esc stops)")
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        self._leave_modal(context)
+
+    def _leave_modal(self, context: bpy.types.Context) -> None:
+        self._steps.close()
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        context.workspace.status_text_set(None)
+
+    def _request(self) -> Request:
+        if not max(self.radius) > 0.0:
+            raise ParameterError("Every scatter radius is 0, so nothing scatters: enter one.")
+        red, green, blue = (max(float(part), LEAST_ALBEDO) for part in self.albedo)
+        return Request((red, green, blue), self.quality, self.seed, method=self.method)
+
+    def _material(self) -> bpy.types.Material:
+        """Return the material the work began with, which may have gone meanwhile."""
+        skin = bpy.data.materials.get(self._skin)
+        if cdrf_node(skin) is None:
+            raise SceneError(
+                f"'{self._skin}' is no longer there or no longer translucent; the measurement is "
+                "kept, so the next one of the same material is done at once."
+            )
+        assert skin is not None
+        return skin
+
+    def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
+        """Path-trace, then work out what this operator is after."""
+        raise NotImplementedError
+
+    def _finish(self, context: bpy.types.Context, found: Any) -> set[str]:
+        """Write the result to the material."""
+        raise NotImplementedError
+
+
+def own_scattering(skin: bpy.types.Material) -> Scattering:
+    """Read a material's scattering from its nodes, else work it out from its scatter distance."""
+    found = read_scattering(skin)
+    if found is not None:
+        # Burley's profile is no path tracing: what it stands for is a random walk.
+        return replace(found, method=RANDOM_WALK) if found.method == BURLEY else found
+    node = cdrf_node(skin)
+    assert node is not None
+    red, green, blue, _ = node.inputs[ids.BASE_COLOR].default_value
+    albedo = (red, green, blue)
+    sigma0 = reflectance_models.channel_sigma0(skin)
+    factors = sigma0_per_radius(albedo, walk_method(RANDOM_WALK))
+    radius = [float(own / factor) for own, factor in zip(sigma0, factors, strict=True)]
+    return Scattering(albedo, (radius[0], radius[1], radius[2]), RANDOM_WALK, 1.0)
+
+
+def _smooth_and_fit(
+    spheres: SphereMeasurement, radius: Colour
+) -> tuple[MeasuredModel, MaterialFit]:
+    return MeasuredModel(spheres, radius), fit_material(spheres)
+
+
+def _aside(
+    call: Callable[[], Any], part: float, what: str
+) -> Generator[tuple[float, str], None, Any]:
+    """Do a second or two of arithmetic in a thread, so that the window stays alive."""
+    with ThreadPoolExecutor(1) as pool:
+        running = pool.submit(call)
+        while not running.done():
+            yield part, what
+            time.sleep(POLL_SECONDS)
+    return running.result()
+
+
+class CDRF_OT_measure(_PathTraced):
+    """Path-trace spheres of this material and shade it with what they show; a minute, once"""
+
+    bl_idname = "cdrf.measure"
+    bl_label = "Measure"
+    bl_options = {"REGISTER", "UNDO"}
+
+    energy: EnumProperty(
+        name="Energy",
+        description=(
+            "A sphere that scatters far is up to a third brighter than an opaque one: light that "
+            "leaves one place arrives at another. A head is not"
+        ),
+        items=(
+            ("AUTO", "Auto", "As measured on spheres, kept on everything else"),
+            ("KEEP", "Keep", "As bright as an opaque surface; closest on heads and figures"),
+            ("MEASURED", "As Measured", "As bright as the sphere was; exact on spheres"),
+        ),
+        default="AUTO",
+    )
+    SETTINGS = ("albedo", "radius", "quality", "seed", "energy")
+
+    def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
+        found = yield from measure_steps(request, cache_folder())
+        kept = self.energy == "KEEP" or (self.energy == "AUTO" and not self._round)
+        make = partial(measured_model, found, tuple(self.radius), keep_energy=kept)
+        return (yield from _aside(make, 1.0, "Smoothing"))
+
+    def _finish(self, context: bpy.types.Context, found: Any) -> set[str]:
+        skin = self._material()
+        model, sigma0 = found
+        skin.cdrf.measured = ensure_table(model).key
+        reflectance_models.set_model(skin, model.key)
+        skin.cdrf.sigma0 = sigma0
+        skin.cdrf.sigma0_ratio = (1.0, 1.0, 1.0)
+        self.report({"INFO"}, f"CDRF: '{skin.name}' is shaded as its spheres were path-traced")
+        return {"FINISHED"}
+
+
+class CDRF_OT_fit(_PathTraced):
+    """Path-trace spheres of this material and fit the scatter distance of each colour to them"""
+
+    bl_idname = "cdrf.fit"
+    bl_label = "Fit \u03c3\u2080"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
+        spheres = yield from measure_steps(request, cache_folder())
+        work = partial(_smooth_and_fit, spheres, tuple(self.radius))
+        return (yield from _aside(work, 1.0, "Fitting"))
+
+    def _finish(self, context: bpy.types.Context, found: Any) -> set[str]:
+        skin = self._material()
+        model, fitted = found
+        if reflectance_models.has_colour(skin):
+            reflectance_models.set_kind(skin, SPHERE)
+        name = "ring" if reflectance_models.kind_of_model(skin) == RING else "sphere"
+        # Right at the object's middle curvature; that sphere is shown, too.
+        kappa = context.object.data.cdrf.median if context.object else 0.0
+        reflectance_models.set_channel_sigma0(skin, sigma0_at(fitted, name, self.radius, kappa))
+        for sentence in fitted.sentences():
+            self.report({"INFO"}, sentence)
+        scale = max(self.radius) * kappa or MIDDLE_SCALE
+        try:
+            path = picture_path(skin, cache_folder())
+            make_picture(model, fitted, scale, path)
+        except OSError as error:
+            self.report({"WARNING"}, f"The picture could not be written: {error.strerror}.")
+            return {"FINISHED"}
+        show_picture(context)
+        self.report({"INFO"}, f"CDRF: picture of the fit written to {path}")
+        return {"FINISHED"}
+
+
+CLASSES = (CDRF_OT_measure, CDRF_OT_fit)
+
+
+def register() -> None:
+    """Register the operators."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Undo `register`."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
