@@ -14,6 +14,7 @@ from tolerances import WORLD_CYCLES, WRITTEN
 from cdrf_addon import compat, ids
 from cdrf_addon.blender import state, world, world_capture
 from cdrf_addon.core.ambient import band_factors, lit_by, panorama_directions
+from cdrf_addon.core.errors import SceneError
 from cdrf_addon.core.models import PROFILE, RING, profile, ring, sphere
 
 
@@ -200,6 +201,21 @@ def test_worlds_are_rendered_once_and_their_strength_is_followed(rig: Rig, monke
     assert len(counted) == 2
     group = cdrf_node(ball).node_tree
     assert all(curve.driver.is_simple_expression for curve in group.animation_data.drivers)
+
+
+def test_without_cycles_the_lights_still_work(rig: Rig, monkeypatch, capfd) -> None:
+    picture(rig, np.linspace(0.1, 1.0, 8 * 16 * 3).reshape(8, 16, 3))
+    rig.light("SUN")
+
+    def refuse(*_arguments):
+        raise SceneError("The world's light could not be read, as Cycles is switched off: enable")
+
+    monkeypatch.setattr(world, "capture", refuse)
+    ball = white(rig)
+    assert world.stamped(cdrf_node(ball).node_tree) is None
+    assert "Sun" in cdrf_node(ball).node_tree.nodes
+    assert any("world" in line for line in due(rig, ball))
+    assert "enable" in capfd.readouterr().out
 
 
 def test_a_saved_file_knows_its_world(rig: Rig, tmp_path, monkeypatch) -> None:

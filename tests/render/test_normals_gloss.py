@@ -169,6 +169,37 @@ def test_gloss_comes_off_without_a_trace(rig: Rig) -> None:
     assert describe(material) == before
 
 
+def test_undo_takes_back_world_and_gloss(rig: Rig) -> None:
+    ball = rig.sphere()
+    ball.name = "Ball"
+    node = surface(ball)
+    node.inputs["Specular IOR Level"].default_value = 0.5
+    sky = rig.scene.world.node_tree.nodes.new("ShaderNodeTexGradient")
+    background = rig.scene.world.node_tree.nodes["Background"]
+    background.inputs["Strength"].default_value = 1.0
+    rig.scene.world.node_tree.links.new(sky.outputs[0], background.inputs["Color"])
+    before = describe(ball.data.materials[0])
+    bpy.ops.ed.undo_push(message="start")
+
+    def material() -> bpy.types.Material:
+        return bpy.data.objects["Ball"].data.materials[0]
+
+    bpy.ops.cdrf.setup()
+    bpy.ops.ed.undo_push(message="setup")
+    material().cdrf.gloss = False
+    bpy.ops.ed.undo_push(message="no gloss")
+    assert not gloss.has_gloss(material())
+    bpy.ops.ed.undo()
+    assert gloss.has_gloss(material())
+    bpy.ops.ed.undo()
+    assert describe(material()) == before
+    assert len(bpy.data.scenes) == 1 and len(bpy.data.worlds) == 1
+    bpy.ops.ed.redo()
+    assert gloss.has_gloss(material())
+    item = bpy.data.objects["Ball"]
+    assert not state.reasons_to_update(item, bpy.context.scene, bpy.context.view_layer)
+
+
 def test_gloss_is_offered_where_there_is_some(rig: Rig) -> None:
     ball = rig.sphere()
     node = surface(ball)
