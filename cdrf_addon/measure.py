@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import subprocess
 import sys
 import tempfile
@@ -17,6 +18,7 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -26,7 +28,7 @@ from .core.errors import MeasurementError
 from .core.measurement import SphereMeasurement, bin_pixels, load, pool, save
 from .core.progress import run_steps
 
-VERSION = 1
+VERSION = 2
 """Part of the cache's key: raise it when the worker measures something else."""
 WORKER = Path(__file__).resolve().with_name("measure_worker.py")
 PROGRESS = "CDRF-PROGRESS"
@@ -67,6 +69,8 @@ class Request:
         scales: radius * scale * kappa of the spheres, ascending; empty takes the rows of a table.
         radius: Factors on the scale per channel; equal ones make a table, others a check.
         elevation: Angle of the light from the picture's plane towards the camera, radians.
+        all_views: Look from all sides in place of one, and put the pixels of equal N.L together:
+            Cycles' random walk does not look the same from everywhere.
         method: The subsurface method, as Blender's node names it.
     """
 
@@ -76,6 +80,7 @@ class Request:
     scales: tuple[float, ...] = ()
     radius: tuple[float, float, float] = (1.0, 1.0, 1.0)
     elevation: float = 0.0
+    all_views: bool = False
     method: str = RANDOM_WALK
 
     def __post_init__(self) -> None:
@@ -99,6 +104,19 @@ class Request:
         first = FIRST_SCALE * (OLD_REACH if old else 1.0)
         rows = tuple(first * 2.0 ** (row / ROWS_PER_OCTAVE) for row in range(ROWS))
         return replace(self, scales=rows)
+
+    def orders(self) -> dict[str, Any]:
+        """Pixels, directions of the light and passes from each."""
+        quality = QUALITIES[self.quality]
+        if not self.all_views:
+            one = {"pixels": quality.pixels, "passes": quality.passes}
+            return one | {"elevations": (self.elevation,)}
+        across, down = quality.pixels
+        side = max(round(math.sqrt(across * down)), 8)
+        views = max(quality.passes // 2, 2)
+        # Equal parts of the sphere of directions from which one may look.
+        elevations = [math.asin((2 * view + 1) / views - 1.0) for view in range(views)]
+        return {"pixels": (side, side), "passes": 2, "elevations": elevations}
 
     def key(self) -> str:
         """Hash of everything that decides the result."""
@@ -182,10 +200,10 @@ def measure_steps(
 
 def write_order(request: Request, folder: Path) -> Path:
     """Write the worker's order, and return its path."""
-    quality = QUALITIES[request.quality]
-    names = ("albedo", "scales", "radius", "seed", "elevation", "method")
-    order = {name: getattr(request, name) for name in names}
-    order |= asdict(quality) | {"answer": str(folder / "answer.npz")}
+    names = ("albedo", "scales", "radius", "seed", "method")
+    order = {name: getattr(request, name) for name in names} | request.orders()
+    order["samples"] = QUALITIES[request.quality].samples
+    order["answer"] = str(folder / "answer.npz")
     path = folder / "order.json"
     path.write_text(json.dumps(order), encoding="utf-8")
     return path
@@ -253,7 +271,8 @@ def _read(request: Request, path: Path) -> SphereMeasurement:
     with np.load(path, allow_pickle=False) as file:
         raw = {name: file[name] for name in file.files}
     numbers = bin_pixels(raw["cosine"])
-    pooled = pool(raw["cosine"], raw["total"], raw["square"], quality.passes, numbers)
+    passes = request.orders()["passes"]
+    pooled = pool(raw["cosine"], raw["total"], raw["square"], passes, numbers)
     return SphereMeasurement(
         np.array(request.albedo),
         np.array(request.scales),
@@ -263,4 +282,5 @@ def _read(request: Request, path: Path) -> SphereMeasurement:
         blender=str(raw["blender"]),
         method=request.method,
         elevation=request.elevation,
+        all_views=request.all_views,
     )

@@ -11,7 +11,8 @@ It stands alone, so that nothing but Blender and NumPy has to be found. The orde
     total    (S, P, 3)  sum over the passes of radiance / (albedo * irradiance / pi)
     square   (S, P, 3)  sum over the passes of its square
 
-Passes differ by their seed alone, so their scatter is the Monte-Carlo error.
+where the pixels of every direction of the light follow one another. Passes of one direction differ
+by their seed alone, so their scatter is the Monte-Carlo error.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -100,8 +102,8 @@ def make_spheres(order: dict[str, Any], columns: int, rows: int) -> None:
         item.color = (1.0, 1.0, 1.0, scale)
 
 
-def make_scene(order: dict[str, Any]) -> None:
-    """Build the scene: a grid of spheres, a camera above it, a sun, and no other light."""
+def make_scene(order: dict[str, Any]) -> bpy.types.Object:
+    """Build the scene; return the sun."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     columns = math.ceil(math.sqrt(len(order["scales"])))
@@ -122,11 +124,9 @@ def make_scene(order: dict[str, Any]) -> None:
     sun.use_shadow = False
     lamp = bpy.data.objects.new("Sun", sun)
     lamp.rotation_mode = "QUATERNION"
-    from mathutils import Vector
-
-    lamp.rotation_quaternion = Vector(towards_light(order["elevation"])).to_track_quat("Z", "Y")
     scene.collection.objects.link(lamp)
     set_render(scene, order, columns, rows)
+    return lamp
 
 
 def set_render(scene: bpy.types.Scene, order: dict[str, Any], columns: int, rows: int) -> None:
@@ -179,28 +179,32 @@ def cells(picture: Array, count: int, across: int, down: int) -> Array:
 def work(order: dict[str, Any]) -> None:
     """Render all passes and write the sums."""
     tell(0.0, "Preparing the spheres")
-    make_scene(order)
+    lamp = make_scene(order)
     scene, (across, down), count = bpy.context.scene, order["pixels"], len(order["scales"])
     seen, normals = pixel_normals(across, down)
     albedo = np.array(order["albedo"], dtype=np.float64)
-    total = np.zeros((count, len(seen), 3))
+    elevations, passes = order["elevations"], order["passes"]
+    total = np.zeros((len(elevations), count, len(seen), 3))
     square = np.zeros_like(total)
     target = Path(order["answer"])
     frame = target.with_name("pass.exr")
     scene.render.filepath = str(frame)
-    for number in range(order["passes"]):
-        text = f"Path tracing {count} spheres, pass {number + 1} of {order['passes']}"
-        tell(number / order["passes"], text)
+    renders = len(elevations) * passes
+    for number in range(renders):
+        tell(number / renders, f"Path tracing {count} spheres, pass {number + 1} of {renders}")
+        view = number // passes
+        direction = Vector(towards_light(elevations[view]))
+        lamp.rotation_quaternion = direction.to_track_quat("Z", "Y")
         scene.cycles.seed = (order["seed"] * 1009 + number) % (2**31 - 1)
         bpy.ops.render.render(write_still=True)
         value = cells(read_pixels(frame), count, across, down)[:, seen] / albedo
-        total += value
-        square += value**2
+        total[view] += value
+        square[view] += value**2
     np.savez(
         target,
-        cosine=normals @ towards_light(order["elevation"]),
-        total=total,
-        square=square,
+        cosine=np.concatenate([normals @ towards_light(angle) for angle in elevations]),
+        total=np.concatenate(total, axis=1),
+        square=np.concatenate(square, axis=1),
         blender=np.array(bpy.app.version_string),
     )
     tell(1.0, "Path tracing done")

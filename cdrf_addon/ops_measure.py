@@ -255,16 +255,25 @@ class CDRF_OT_measure(_PathTraced):
         ),
         items=(
             ("AUTO", "Auto", "As measured on spheres, kept on everything else"),
-            ("KEEP", "Keep", "As bright as an opaque surface; closest on heads and figures"),
-            ("MEASURED", "As Measured", "As bright as the sphere was; exact on spheres"),
+            (
+                "KEEP",
+                "Keep",
+                "As bright as an opaque surface, spheres seen from all sides; closest on heads",
+            ),
+            (
+                "MEASURED",
+                "As Measured",
+                "As bright as a sphere lit from the side; exact on such spheres",
+            ),
         ),
         default="AUTO",
     )
     SETTINGS = ("albedo", "radius", "quality", "seed", "energy")
 
     def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
-        found = yield from measure_steps(request, cache_folder())
         kept = self.energy == "KEEP" or (self.energy == "AUTO" and not self._round)
+        # What is to be seen from anywhere is measured from everywhere.
+        found = yield from measure_steps(replace(request, all_views=kept), cache_folder())
         make = partial(measured_model, found, tuple(self.radius), keep_energy=kept)
         return (yield from _aside(make, 1.0, "Smoothing"))
 

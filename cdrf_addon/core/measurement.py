@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 MAGIC = "cdrf sphere measurement"
-FORMAT = 1
+FORMAT = 2
 # Bins of theta in radians, where the pixels are not in columns of equal N.L.
 BIN = math.radians(3.0)
 LEAST_PIXELS = 3
@@ -50,6 +50,7 @@ class SphereMeasurement:
         blender: Version that rendered.
         method: Subsurface method of the node, as Blender names it.
         elevation: Angle of the light from the picture's plane towards the camera, radians.
+        all_views: True if the spheres were seen from all sides and their pixels put together.
     """
 
     albedo: Array
@@ -62,6 +63,7 @@ class SphereMeasurement:
     blender: str = ""
     method: str = "RANDOM_WALK"
     elevation: float = 0.0
+    all_views: bool = False
 
     def __post_init__(self) -> None:
         for name in ("albedo", "scales", "cosine", "values", "errors"):

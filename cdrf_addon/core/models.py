@@ -239,7 +239,8 @@ def measured_model(
         float(ratio * slope / slopes[widest]) ** 2
         for ratio, slope in zip(table.ratio, slopes, strict=True)
     )
-    facts = [spheres.blender, spheres.method, spheres.seed, spheres.samples, keep_energy]
+    facts = [spheres.blender, spheres.method, spheres.seed, spheres.samples]
+    facts += [spheres.all_views, keep_energy]
     numbers = [float(number) for number in (*spheres.albedo, *table.ratio)]
     key = f"{MEASURED} {_hash(str(facts), str(numbers))}"
     evaluate = conserving(table.evaluate) if keep_energy else table.evaluate
