@@ -85,8 +85,8 @@ def walk_method(method: str) -> str:
     return legacy if method == "RANDOM_WALK" and legacy not in known else method
 
 
-def uses_nodes(material: bpy.types.Material) -> bool:
-    """Tell whether the renderer looks at the material's nodes; always so from 5.0 on."""
+def uses_nodes(material: bpy.types.Material | bpy.types.World) -> bool:
+    """Tell whether the renderer looks at a material's or world's nodes; always so from 5.0 on."""
     if material.node_tree is None:
         return False
     return bpy.app.version >= (5, 0, 0) or material.use_nodes
@@ -96,3 +96,10 @@ def set_uses_nodes(material: bpy.types.Material, value: bool) -> None:
     """Switch a 4.5 material between its nodes and its plain viewport colour."""
     if bpy.app.version < (5, 0, 0) and material.use_nodes != value:
         material.use_nodes = value
+
+
+def set_equirectangular(camera: bpy.types.Camera) -> None:
+    """Make a camera see all around; the setting was Cycles' own before 5.0."""
+    camera.type = "PANO"
+    owner = camera if hasattr(camera, "panorama_type") else camera.cycles
+    owner.panorama_type = "EQUIRECTANGULAR"

@@ -356,6 +356,7 @@ CLASSES = (
 _HANDLERS = (
     ("depsgraph_update_post", state.note_touched),
     ("load_post", state.forget_all),
+    ("load_post", state.forget_worlds),
     ("undo_post", state.forget_all),
     ("redo_post", state.forget_all),
 )

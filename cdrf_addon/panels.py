@@ -8,7 +8,7 @@ import textwrap
 import bpy
 
 from . import ids
-from .blender import display, materials, reflectance_models, shader, state
+from .blender import display, gloss, materials, reflectance_models, shader, state, world
 from .compat import EEVEE
 from .core.estimators import METHODS
 from .core.models import MODEL_ITEMS, PROFILE
@@ -46,6 +46,8 @@ def draw_skin(
     if not node.inputs[ids.BASE_COLOR].is_linked:
         column.prop(node.inputs[ids.BASE_COLOR], "default_value", text="Base Color")
     column.prop(node.inputs[ids.STRENGTH], "default_value", text="Strength")
+    if ids.DETAIL_SIZE in node.inputs:
+        column.prop(node.inputs[ids.DETAIL_SIZE], "default_value", text="Detail Size")
     wired = shader.wired_lights(node.node_tree)
     lookups = sum(len(shared.split()) for *_, shared in wired)
     plural = "" if lookups == 1 else "s"
@@ -72,6 +74,36 @@ def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None
         problem = reflectance_models.profile_problem(material)
         if problem:
             column.label(text=problem, icon="ERROR")
+
+
+def draw_ambient(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
+    """Draw what of the world's light reaches the material, and its occlusion."""
+    node = materials.cdrf_node(skin)
+    assert node is not None
+    light = world.stamped(node.node_tree)
+    if light is None:
+        layout.label(text="No light from the world", icon="WORLD")
+        return
+    text = {
+        world.FIXED: "World as of the last Update",
+        world.SCALED: "World; its strength is followed",
+    }.get(light.kind, "World; colour and strength followed")
+    if light.environment.sun is not None:
+        text += ", with a sun"
+    layout.label(text=text, icon="WORLD")
+    row = layout.row(align=True)
+    row.enabled = skin.is_editable
+    row.prop(skin.cdrf, "ambient_occlusion", toggle=True)
+    if ids.OCCLUSION_DISTANCE in node.inputs:
+        row.prop(node.inputs[ids.OCCLUSION_DISTANCE], "default_value", text="Distance")
+
+
+def draw_gloss(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
+    """Draw the switch of the gloss, where the material has any to keep."""
+    if gloss.find_principled(skin) is not None:
+        row = layout.row()
+        row.enabled = skin.is_editable
+        row.prop(skin.cdrf, "gloss", text="Gloss of Principled BSDF", toggle=True, icon="MATERIAL")
 
 
 def draw_display(
@@ -165,6 +197,8 @@ class CDRF_PT_main(_View3D, bpy.types.Panel):
         layout.label(text=skin.name, icon="MATERIAL")
         draw_skin(layout, context, skin)
         draw_model(layout, skin)
+        draw_ambient(layout, skin)
+        draw_gloss(layout, skin)
         draw_display(layout, context, skin)
         draw_state(layout, context, item)
 
@@ -191,6 +225,8 @@ class CDRF_PT_material(bpy.types.Panel):
             return
         draw_skin(layout, context, material)
         draw_model(layout, material)
+        draw_ambient(layout, material)
+        draw_gloss(layout, material)
         draw_state(layout, context, context.object)
 
 

@@ -8,6 +8,7 @@ import math
 
 import bpy
 from bpy.props import (
+    BoolProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -17,8 +18,9 @@ from bpy.props import (
 )
 
 from . import ids
-from .blender import reflectance_models
+from .blender import gloss, reflectance_models
 from .blender.materials import cdrf_node
+from .blender.shader import stamped_variant
 from .core.errors import CdrfError
 from .core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
 from .core.mesh import NO_CREASE
@@ -80,6 +82,33 @@ def _profile_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
     if reflectance_models.kind_of_model(self.id_data) == PROFILE:
         with contextlib.suppress(CdrfError):
             reflectance_models.set_kind(self.id_data, PROFILE)
+
+
+def _get_occlusion(self: CdrfMaterial) -> bool:
+    node = cdrf_node(self.id_data)
+    return stamped_variant(node.node_tree).occluded if node else self.chosen_occlusion
+
+
+def _set_occlusion(self: CdrfMaterial, value: bool) -> None:
+    self.chosen_occlusion = value
+    with contextlib.suppress(CdrfError):
+        reflectance_models.change_variant(self.id_data, occluded=value)
+
+
+def _get_gloss(self: CdrfMaterial) -> bool:
+    if cdrf_node(self.id_data) is None:
+        return self.wants_gloss()
+    return gloss.has_gloss(self.id_data)
+
+
+def _set_gloss(self: CdrfMaterial, value: bool) -> None:
+    self.chosen_gloss = int(value)
+    if cdrf_node(self.id_data) is None or not self.id_data.is_editable:
+        return
+    if value:
+        gloss.add_gloss(self.id_data)
+    else:
+        gloss.remove_gloss(self.id_data)
 
 
 class CdrfMaterial(bpy.types.PropertyGroup):
@@ -147,6 +176,33 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         update=_profile_changed,
         options=set(),
     )
+    gloss: BoolProperty(
+        name="Gloss",
+        description=(
+            "Keep the specular half of the material's Principled BSDF (roughness, coat, sheen, "
+            "emission) on top of the translucent surface"
+        ),
+        get=_get_gloss,
+        set=_set_gloss,
+        options=set(),
+    )
+    chosen_gloss: IntProperty(default=-1, options={"HIDDEN"})
+    ambient_occlusion: BoolProperty(
+        name="Ambient Occlusion",
+        description=(
+            "What is near takes away from the world's light: darker nostrils, ears and collars. "
+            "Found in what is on screen, so it costs time per pixel. Lights are not affected"
+        ),
+        get=_get_occlusion,
+        set=_set_occlusion,
+        options=set(),
+    )
+    chosen_occlusion: BoolProperty(default=False, options={"HIDDEN"})
+
+    def wants_gloss(self) -> bool:
+        """What was chosen; without a choice, whether the material has gloss to keep."""
+        return gloss.suits(self.id_data) if self.chosen_gloss < 0 else bool(self.chosen_gloss)
+
     chosen_model: StringProperty(options={"HIDDEN"})
     measured: StringProperty(options={"HIDDEN"})
     # Blender deletes pictures that nobody uses; this one is wanted again.

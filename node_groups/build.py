@@ -19,7 +19,7 @@ sys.path.insert(0, str(HERE.parent))
 
 import bpy  # noqa: E402  (the checkout must be importable first)
 
-from cdrf_addon.blender import groups  # noqa: E402
+from cdrf_addon.blender import ambient_nodes, gloss, groups  # noqa: E402
 from cdrf_addon.blender.image import ensure_table  # noqa: E402
 from cdrf_addon.core.models import name_of, profile, ring, sphere  # noqa: E402
 
@@ -37,6 +37,10 @@ DESCRIPTIONS = {
     "CDRF Reflectance Ring RGB": "f(theta, sigma) of Kubo et al. 2011, one sigma for all channels",
     "CDRF Reflectance Ring R+G+B": "f(theta, sigma) of Kubo et al. 2011, a sigma for each channel",
     SKIN_GROUP: "f(theta, sigma) of layered skin (d'Eon and Luebke 2007) in one look-up",
+    "CDRF Bands Sphere R+G+B": "What diffusion on a sphere leaves of a world's bands",
+    "CDRF Harmonics": "A world's light on a surface, as nine harmonics of three colours",
+    "CDRF Detail": "Part of a normal map's detail that a scatter distance leaves",
+    "CDRF Under Gloss": "Part of the light that gloss lets through to the surface under it",
     "CDRF Diffused Curvature": "Curvature at the length over which a channel's light diffuses",
     "CDRF Curvature Display": "Curvature in hot colours",
     "CDRF Signed Curvature Display": "Curvature from blue hollows to red bulges",
@@ -53,6 +57,20 @@ def build_all() -> list[bpy.types.ShaderNodeTree]:
         for model in (sphere(), ring(), profile())
         for channels in groups.CHANNEL_SETS
     ]
+    built += [
+        groups.reflectance_group(groups.SEPARATE, ensure_table(model), own_cosines=True)
+        for model in (sphere(), profile())
+    ]
+    built += [
+        ambient_nodes.bands_group(channels, ensure_table(model))
+        for model, channels in (
+            (sphere(), "RGB"),
+            (sphere(), groups.SEPARATE),
+            (ring(), "RGB"),
+            (profile(), "RGB"),
+        )
+    ]
+    built += [ambient_nodes.harmonics_group(), groups.detail_group(), gloss.under_gloss_group()]
     built.append(groups.diffused_group())
     built += [groups.display_group(signed=signed) for signed in (False, True)]
     return built

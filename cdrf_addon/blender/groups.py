@@ -20,6 +20,7 @@ import bpy
 
 from .. import ids
 from ..core.colour_scale import HOT, MARK_COLOUR, SIGNED
+from ..core.detail import PHASE
 from ..core.finite_light import VARIANCE_COEFFICIENTS
 from ..core.lut import DEFAULT_LAYOUT, VARIANCE_MAX
 from ..core.models import name_of
@@ -27,7 +28,7 @@ from ..core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS
 from .image import Table
 from .nodetree import TreeBuilder, declare, ensure_group
 
-VERSION = 5
+VERSION = 6
 
 ELLIPTIC = {"DISK", "ELLIPSE"}
 
@@ -43,10 +44,13 @@ def _ends(b: TreeBuilder) -> tuple[Any, Any]:
     return b.node("NodeGroupInput").outputs, b.node("NodeGroupOutput").inputs
 
 
-def reflectance_group(channels: str, table: Table) -> bpy.types.ShaderNodeTree:
+def reflectance_group(
+    channels: str, table: Table, *, own_cosines: bool = False
+) -> bpy.types.ShaderNodeTree:
     """f(theta, sigma) per channel, one texture look-up per part of `channels` ("RG B": two).
 
-    Of a table with colour, each channel takes its own part of what was looked up.
+    Of a table with colour, each channel takes its own part of what was looked up. With
+    `own_cosines` each channel has its own normal, and so its own cosine.
 
     Wiring, with K, offset and scale from core/lut.py:
 
@@ -55,21 +59,26 @@ def reflectance_group(channels: str, table: Table) -> bpy.types.ShaderNodeTree:
     """
 
     def build(b: TreeBuilder) -> None:
-        declare(b.tree, ids.COSINE, default=1.0, tip="Cosine between normal and light")
+        kind = "Vector" if own_cosines else "Float"
+        declare(
+            b.tree,
+            ids.COSINE,
+            kind,
+            default=(1.0,) * 3 if own_cosines else 1.0,
+            tip="Cosine between normal and light",
+        )
         declare(b.tree, ids.VARIANCE, "Vector", tip="Squared blur width of each channel")
         declare(b.tree, ids.REFLECTANCE, "Vector", output=True)
         given, result = _ends(b)
         layout = DEFAULT_LAYOUT
-        cosine = given[ids.COSINE]
-        root = b.math("SQRT", b.math("ABSOLUTE", cosine))
-        q = b.math("MULTIPLY", root, b.math("SIGN", cosine))
-        p = b.math("MULTIPLY", q, math.pi * layout.seam_factor)
-        # Blender maps the tube's (0..1) cube to (-1..1) itself.
-        across = b.math("MULTIPLY_ADD", b.math("SINE", p), 0.5, 0.5)
-        along = b.math("MULTIPLY_ADD", b.math("COSINE", p), 0.5, 0.5)
+        if own_cosines:
+            cosines = dict(zip("RGB", b.separate(given[ids.COSINE]), strict=True))
+        else:
+            place = _on_tube(b, given[ids.COSINE])
         variance = dict(zip("RGB", b.separate(given[ids.VARIANCE]), strict=True))
         f = {}
         for shared in channels.split():
+            across, along = _on_tube(b, cosines[shared[0]]) if own_cosines else place
             # The limit first: MINIMUM(limit, NaN) is the limit, so a bad attribute stays finite.
             w = b.math("MINIMUM", VARIANCE_MAX, variance[shared[0]])
             w = b.math("SQRT", b.math("SQRT", b.math("MAXIMUM", 0.0, w)))
@@ -91,7 +100,39 @@ def reflectance_group(channels: str, table: Table) -> bpy.types.ShaderNodeTree:
 
     name = f"CDRF Reflectance {name_of(table.key)} {'+'.join(channels.split())}"
     role = f"{ids.ROLE_REFLECTANCE} {channels} {table.key}"
+    if own_cosines:
+        name, role = f"{name} mapped", f"{role} mapped"
     return ensure_group(name, role, VERSION, build)
+
+
+def _on_tube(b: TreeBuilder, cosine: Any) -> tuple[Any, Any]:
+    """Texture coordinates around the tube of a cosine's column."""
+    root = b.math("SQRT", b.math("ABSOLUTE", cosine))
+    q = b.math("MULTIPLY", root, b.math("SIGN", cosine))
+    p = b.math("MULTIPLY", q, math.pi * DEFAULT_LAYOUT.seam_factor)
+    # Blender maps the tube's (0..1) cube to (-1..1) itself.
+    across = b.math("MULTIPLY_ADD", b.math("SINE", p), 0.5, 0.5)
+    along = b.math("MULTIPLY_ADD", b.math("COSINE", p), 0.5, 0.5)
+    return across, along
+
+
+def detail_group() -> bpy.types.ShaderNodeTree:
+    """Part of a normal map's detail that a sigma0 leaves (core/detail.py)."""
+
+    def build(b: TreeBuilder) -> None:
+        declare(b.tree, ids.SIGMA0, default=0.0, tip="Scatter distance of the channel")
+        declare(b.tree, ids.DETAIL_SIZE, default=0.0, tip="Wavelength of the map's detail")
+        declare(b.tree, ids.WEIGHT, output=True)
+        given, result = _ends(b)
+        # Blender's division by zero is zero: all detail stays.
+        ratio = b.math("DIVIDE", given[ids.SIGMA0], given[ids.DETAIL_SIZE])
+        square = b.math("MULTIPLY", b.math("MULTIPLY", ratio, ratio), PHASE**2)
+        near = b.math("INVERSE_SQRT", b.math("ADD", square, 1.0))
+        far = b.math("INVERSE_SQRT", b.math("MULTIPLY_ADD", square, 9.0, 1.0))
+        far = b.math("MULTIPLY", far, 0.75)
+        b.feed(result[ids.WEIGHT], b.math("MULTIPLY_ADD", near, 0.25, far))
+
+    return ensure_group("CDRF Detail", ids.ROLE_DETAIL, VERSION, build)
 
 
 def diffused_group() -> bpy.types.ShaderNodeTree:

@@ -184,7 +184,7 @@ def _inverse_range2() -> tuple[str, dict[str, str]]:
 def drive(
     tree: bpy.types.ShaderNodeTree,
     socket: bpy.types.NodeSocket,
-    source: bpy.types.Object,
+    source: bpy.types.ID,
     expression: str,
     paths: Mapping[str, str],
     index: int = -1,
@@ -194,7 +194,7 @@ def drive(
     Args:
         tree: The node tree that owns the driver.
         socket: An unlinked input; addressed by node and socket name, which survives reordering.
-        source: Object the paths start from. A path "scene:..." starts from the active scene.
+        source: Data the paths start from. A path "scene:..." starts from the active scene.
         expression: Over the names of `paths`, in Blender's Python-free subset.
         paths: Property path of each name.
         index: Component of a vector socket, -1 for a scalar.
@@ -218,6 +218,7 @@ def drive(
             variable.targets[0].context_property = "ACTIVE_SCENE"
             variable.targets[0].data_path = where.removeprefix("scene:")
         else:
+            variable.targets[0].id_type = source.id_type
             variable.targets[0].id = source
             variable.targets[0].data_path = where
     driver.expression = expression

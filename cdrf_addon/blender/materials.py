@@ -89,6 +89,14 @@ def find_surface_source(material: bpy.types.Material) -> SurfaceSource:
     return SurfaceSource(tuple(material.diffuse_color))
 
 
+def is_mapped(material: bpy.types.Material) -> bool:
+    """Tell whether a normal or bump map feeds the skin, or will once it is translucent."""
+    node = cdrf_node(material)
+    if node is not None:
+        return bool(node.inputs[ids.NORMAL].is_linked)
+    return find_surface_source(material).normal is not None
+
+
 def _link(node: bpy.types.ShaderNode, name: str) -> Any:
     socket = node.inputs.get(name)
     return socket.links[0].from_socket if socket is not None and socket.is_linked else None
@@ -101,7 +109,7 @@ def _fed(node: bpy.types.ShaderNode, name: str, default: Any = None) -> Any:
     return _link(node, name) or (value if isinstance(value, float) else tuple(value))
 
 
-def _own(tree: bpy.types.ShaderNodeTree | None, role: str) -> bpy.types.ShaderNode | None:
+def own_node(tree: bpy.types.ShaderNodeTree | None, role: str) -> bpy.types.ShaderNode | None:
     """Find a node that we put into a material, whatever its name by now."""
     nodes = tree.nodes if tree else ()
     return next((node for node in nodes if node.get(ids.ROLE_KEY) == role), None)
@@ -109,14 +117,22 @@ def _own(tree: bpy.types.ShaderNodeTree | None, role: str) -> bpy.types.ShaderNo
 
 def skin_output(material: bpy.types.Material) -> bpy.types.ShaderNode | None:
     """Return the material's CDRF output, or None if it has none (any more)."""
-    return _own(material.node_tree, ids.ROLE_OUTPUT)
+    return own_node(material.node_tree, ids.ROLE_OUTPUT)
 
 
 def skin_socket(material: bpy.types.Material) -> bpy.types.NodeSocket:
     """Return the socket that carries the translucent surface, its transparency included."""
-    mix = _own(material.node_tree, ids.ROLE_ALPHA)
+    mix = own_node(material.node_tree, ids.ROLE_ALPHA)
     if mix is not None:
         return mix.outputs["Shader"]
+    return core_socket(material)
+
+
+def core_socket(material: bpy.types.Material) -> bpy.types.NodeSocket:
+    """Return the socket that carries the translucent surface with its gloss, but not its alpha."""
+    end = own_node(material.node_tree, ids.ROLE_GLOSS_END)
+    if end is not None:
+        return end.outputs["Shader"]
     node = cdrf_node(material)
     assert node is not None
     return node.outputs[ids.SHADER]

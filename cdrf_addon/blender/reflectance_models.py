@@ -15,6 +15,7 @@ import bpy
 
 from .. import ids
 from ..compat import animation_curves, walk_method
+from ..core.detail import DETAIL_PER_SIGMA0
 from ..core.errors import ParameterError, SceneError
 from ..core.models import (
     DEFAULT_KIND,
@@ -31,7 +32,7 @@ from ..core.models import (
 )
 from ..core.presets import Preset, in_units
 from ..core.scattering import sigma0_per_radius
-from . import shader
+from . import shader, world
 from .image import ensure_table, find_table, table_of
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
@@ -201,6 +202,15 @@ def apply_preset(material: bpy.types.Material, preset: Preset, metres: float, si
         set_kind(material, DEFAULT_KIND)
     material.cdrf.sigma0 = sigma0
     material.cdrf.sigma0_ratio = ratio
+    choose_detail(material)
+
+
+def choose_detail(material: bpy.types.Material) -> None:
+    """Take the detail of the material's normal map as fine as its scatter distance asks for."""
+    node = cdrf_node(material)
+    if node is not None and ids.DETAIL_SIZE in node.inputs:
+        largest = material.cdrf.sigma0 * max(material.cdrf.sigma0_ratio)
+        node.inputs[ids.DETAIL_SIZE].default_value = DETAIL_PER_SIGMA0 * largest
 
 
 def ensure_chosen(material: bpy.types.Material) -> tuple[str, str]:
@@ -237,17 +247,26 @@ def change_variant(
     material: bpy.types.Material,
     ratio: Sequence[float] | None = None,
     model: str | None = None,
+    occluded: bool | None = None,
 ) -> None:
-    """Swap a translucent material's shader group for one of another ratio or model."""
+    """Swap a translucent material's shader group for one of another ratio, model or occlusion."""
     node = cdrf_node(material)
     if node is None:
         return
     now = shader.stamped_variant(node.node_tree)
     channels = node.inputs[ids.SIGMA0_RATIO].default_value if ratio is None else ratio
-    wanted = shader.variant_of(tuple(channels), now.source, now.model if model is None else model)
+    wanted = shader.variant_of(
+        tuple(channels),
+        now.source,
+        now.model if model is None else model,
+        mapped=now.mapped,
+        occluded=now.occluded if occluded is None else occluded,
+    )
     where = scene_of_group(node.node_tree)
     if wanted != now and where is not None:
-        install(material, shader.ensure_shader_group(wanted, *where))
+        # The world's light as it was at the last Update: a slider must not render anything.
+        light = world.stamped(node.node_tree)
+        install(material, shader.ensure_shader_group(wanted, *where, light))
 
 
 def scene_of_group(

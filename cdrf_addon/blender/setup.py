@@ -36,9 +36,9 @@ from ..core.summary import (
     CurvatureSummary,
     summarise,
 )
-from . import display, reflectance_models, shader, state
+from . import display, gloss, reflectance_models, shader, state, world
 from .lights import SceneLight, scene_lights
-from .materials import cdrf_node, install, require_editable
+from .materials import cdrf_node, install, is_mapped, require_editable
 from .mesh_io import (
     Shape,
     base_fingerprint,
@@ -156,6 +156,7 @@ class Setup:
         self.slots: list[bpy.types.MaterialSlot] = []
         self.bare: list[bpy.types.Object] = []
         self._own: dict[bpy.types.Material, Scattering | None] = {}
+        self.world: world.WorldLight | None = None
         self._choose(list(objects), only_active_slot, convert)
         self.work = self._gather()
 
@@ -252,6 +253,21 @@ class Setup:
                     raise
                 self._leave_out(work, str(error))
             done += size
+        yield 1.0, "The world's light"
+        self._read_world()
+
+    def _read_world(self) -> None:
+        """See what the world gives; without it the lights still shine."""
+        found = world.scene_world(self.scene, self.view_layer)
+        try:
+            self.world = world.world_light(found, again=self.recompute)
+        except CdrfError as error:
+            self.report.warnings.append(str(error))
+        if found is not None and self.world is not None and world.is_animated(found):
+            self.report.warnings.append(
+                f"The world '{found.name}' is animated: its strength is followed, the rest is that "
+                f"of frame {self.scene.frame_current}."
+            )
 
     def _leave_out(self, work: _MeshWork, reason: str) -> None:
         self.work.remove(work)
@@ -424,8 +440,16 @@ class Setup:
         model, lost = reflectance_models.ensure_chosen(material)
         if lost:
             self.report.warnings.append(lost)
-        wanted = shader.variant_of(ratio, source, model)
-        group = shader.ensure_shader_group(wanted, self.scene, lights)
+        wanted = shader.variant_of(
+            ratio,
+            source,
+            model,
+            mapped=is_mapped(material),
+            occluded=settings.ambient_occlusion,
+        )
+        group = shader.ensure_shader_group(wanted, self.scene, lights, self.world)
+        before = cdrf_node(material)
+        had_detail = before is not None and ids.DETAIL_SIZE in before.inputs
         node = install(material, group)
         work = self._work_of(material)
         if fresh:
@@ -438,6 +462,11 @@ class Setup:
             elif settings.chosen_sigma0 < 0.0:
                 settings.chosen_sigma0 = _first_sigma0(work)
             node.inputs[ids.SIGMA0].default_value = settings.chosen_sigma0
+        if settings.gloss if not fresh else settings.wants_gloss():
+            # The artist's node may have changed since, or been removed.
+            gloss.add_gloss(material)
+        if wanted.mapped and not had_detail:
+            reflectance_models.choose_detail(material)
         if source == shader.CONSTANT:
             kappas = [item.mean_values[0] for item in work]
             node.inputs[ids.CURVATURE].default_value = float(np.mean(kappas))
@@ -463,7 +492,7 @@ class Setup:
                     f"The lights inside the instance '{item.name}' do not reach the surface: "
                     "make them real (Object > Apply > Make Instances Real)."
                 )
-        if not lights:
+        if not lights and self.world is None:
             report.warnings.append("The scene has no light that renders, so the surface is black.")
         if self.scene.render.engine not in {EEVEE, "BLENDER_WORKBENCH"}:
             report.warnings.append(
@@ -522,7 +551,9 @@ def _materials(item: bpy.types.Object) -> set[bpy.types.Material]:
 
 
 def _new_material(name: str) -> bpy.types.Material:
-    return bpy.data.materials.new(f"{name} Translucent")
+    material = bpy.data.materials.new(f"{name} Translucent")
+    material.cdrf.chosen_gloss = 0  # what Blender puts into a new material is nobody's choice
+    return material
 
 
 def _first_sigma0(work: list[_MeshWork]) -> float:

@@ -6,31 +6,46 @@ each model of reflectance; the branches are one per light. Wiring:
 
     attribute levels -> kappa at the channel's length                 |
                      -> x Sigma0 x Ratio -> squared = variance --------+
-    Normal (or geometry) --+                                          |
+    normal (or map) -------+                                          |
     light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance/moment
             -> Radiance ------------------------------> x f --> sum over i --> x Base Color
+    world (ambient_nodes.py) ------------------------------------> + ^
                                                                            x Strength -> Emission
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import bpy
 
 from .. import ids
-from ..core.models import RING, name_of
-from .groups import SEPARATE, diffused_group, light_group, reflectance_group
+from ..core.models import RING, SPHERE, name_of
+from .ambient_nodes import (
+    bands_group,
+    feed_sun,
+    harmonics_node,
+    occlusion_node,
+    world_strength,
+)
+from .groups import SEPARATE, detail_group, diffused_group, light_group, reflectance_group
 from .image import Table, find_table, table_of
-from .lights import SceneLight, drive_light
+from .lights import HARD_SUN, SceneLight, drive_light
 from .nodetree import TreeBuilder, declare, is_intact, rebuild
+from .world import WorldLight, is_same, stamp, stamped
 
-VERSION = 5
+VERSION = 6
 
 # A channel narrower than a hundredth of the widest is Lambert in every row of the table.
 LEAST_MOMENT = 1e-4
+# A sun of more than 3 degrees blurs the terminator visibly (lights.HARD_SUN).
+SMALL_SUN = math.sin(HARD_SUN / 2.0) ** 2
+
+Normals = dict[str, Any]
+"""Sets of channels that share a normal, and the normal."""
 
 FLAT, CONSTANT, ATTRIBUTE, SCALED = "flat", "constant", "attribute", "scaled attribute"
 """Where kappa comes from: nowhere, the Curvature input, the mesh, the mesh and the object."""
@@ -46,22 +61,35 @@ class Variant:
     """FLAT, CONSTANT, ATTRIBUTE or SCALED."""
     model: str
     """Key of the model of reflectance."""
+    mapped: bool = False
+    """Whether a normal or bump map feeds the Normal input."""
+    occluded: bool = False
+    """Whether what is near takes away from the world's light."""
 
     @property
     def name(self) -> str:
         """Name of the node group."""
         lookups = "+".join(self.channels.split())
         source = "" if self.source == ATTRIBUTE else f" {self.source}"
-        return f"CDRF {name_of(self.model)} {lookups}{source}"
+        extras = (" mapped" if self.mapped else "") + (" occluded" if self.occluded else "")
+        return f"CDRF {name_of(self.model)} {lookups}{source}{extras}"
 
 
-def variant_of(ratio: Sequence[float], source: str, model: str) -> Variant:
+def variant_of(
+    ratio: Sequence[float],
+    source: str,
+    model: str,
+    *,
+    mapped: bool = False,
+    occluded: bool = False,
+) -> Variant:
     """Choose the variant with one look-up per distinct sigma0.
 
-    A flat mesh has sigma = 0 in every channel, whatever the ratio: one look-up.
+    A flat mesh has sigma = 0 in every channel, whatever the ratio: one look-up, unless a map gives
+    each channel a normal of its own.
     """
-    if source == FLAT:
-        return Variant("RGB", FLAT, model)
+    if source == FLAT and not mapped:
+        return Variant("RGB", FLAT, model, False, occluded)
     red, green, blue = ratio
     if red == green == blue:
         channels = "RGB"
@@ -73,7 +101,7 @@ def variant_of(ratio: Sequence[float], source: str, model: str) -> Variant:
         channels = "RB G"
     else:
         channels = "R G B"
-    return Variant(channels, source, model)
+    return Variant(channels, source, model, mapped, occluded)
 
 
 def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
@@ -81,16 +109,23 @@ def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
 
     The paper's ring was the only model before version 5.
     """
-    return Variant(group[ids.CHANNELS_KEY], group[ids.SOURCE_KEY], group.get(ids.MODEL_KEY, RING))
+    return Variant(
+        group[ids.CHANNELS_KEY],
+        group[ids.SOURCE_KEY],
+        group.get(ids.MODEL_KEY, RING),
+        bool(group.get(ids.MAPPED_KEY, False)),
+        bool(group.get(ids.OCCLUDED_KEY, False)),
+    )
 
 
 def branch_lookups(table: Table, variant: Variant, light: SceneLight) -> str:
     """Choose which channels share a look-up for a light.
 
     Where one look-up of a table with colour serves all channels, a light of some size needs three:
-    its own blur adds to a wide channel's and to a narrow one's in different parts.
+    its own blur adds to a wide channel's and to a narrow one's in different parts. So it does under
+    a normal map, of which each channel sees another part.
     """
-    return SEPARATE if table.colour and light.soft else variant.channels
+    return SEPARATE if table.colour and (light.soft or variant.mapped) else variant.channels
 
 
 def is_shader_group(group: bpy.types.ShaderNodeTree | None) -> bool:
@@ -99,7 +134,10 @@ def is_shader_group(group: bpy.types.ShaderNodeTree | None) -> bool:
 
 
 def ensure_shader_group(
-    variant: Variant, scene: bpy.types.Scene, lights: Sequence[SceneLight]
+    variant: Variant,
+    scene: bpy.types.Scene,
+    lights: Sequence[SceneLight],
+    world: WorldLight | None = None,
 ) -> bpy.types.ShaderNodeTree:
     """Return the scene's group of that variant, its light branches brought up to date."""
     group = _find(variant, scene)
@@ -109,13 +147,16 @@ def ensure_shader_group(
         group[ids.CHANNELS_KEY] = variant.channels
         group[ids.SOURCE_KEY] = variant.source
         group[ids.MODEL_KEY] = variant.model
+        group[ids.MAPPED_KEY] = variant.mapped
+        group[ids.OCCLUDED_KEY] = variant.occluded
         group[ids.SCENE_KEY] = scene.name
         group.color_tag = "SHADER"
         group.description = "Curvature-dependent translucency (Kubo et al. 2011), made by CDRF"
-    elif is_current(group, lights):
+    elif is_current(group, lights) and is_same(stamped(group), world):
         return group
     table = table_of(variant.model)
-    rebuild(group, lambda builder: _build(builder, variant, lights, table))
+    rebuild(group, lambda builder: _build(builder, variant, lights, world, table))
+    stamp(group, world)
     group[ids.VERSION_KEY] = VERSION
     return group
 
@@ -139,7 +180,8 @@ def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) ->
     variant = stamped_variant(group)
     table = find_table(variant.model)
     if table is None:
-        return False
+        # Where only the world shines nothing may have used it, and a saved file drops it.
+        return not lights and not wired_lights(group)
     wanted = {(light.object, light.kind, branch_lookups(table, variant, light)) for light in lights}
     return set(wired_lights(group)) == wanted
 
@@ -198,14 +240,40 @@ def _declare(tree: bpy.types.ShaderNodeTree) -> None:
         "Vector",
         default=(0.0, 0.0, 0.0),
         hide_value=True,
-        tip="Normal or bump map; unconnected, the surface's own normal",
+        tip="Normal or bump map; after connecting one press Update",
     )
     declare(tree, ids.STRENGTH, default=1.0, low=0.0, high=1e6, tip="Factor on the result")
     declare(tree, ids.SHADER, "Shader", output=True)
 
 
-def _build(b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight], table: Table) -> None:
+def _build(
+    b: TreeBuilder,
+    variant: Variant,
+    lights: Sequence[SceneLight],
+    world: WorldLight | None,
+    table: Table,
+) -> None:
     _declare(b.tree)
+    if variant.mapped:
+        declare(
+            b.tree,
+            ids.DETAIL_SIZE,
+            default=0.0,
+            low=0.0,
+            high=1e6,
+            subtype="DISTANCE",
+            tip="Size of the normal map's detail, from bump to bump. What is finer than the "
+            "scatter distance is blurred, red most. 0 keeps all",
+        )
+    if variant.occluded:
+        declare(
+            b.tree,
+            ids.OCCLUSION_DISTANCE,
+            default=1.0,
+            low=0.0,
+            subtype="DISTANCE",
+            tip="How far away a surface may be that still takes away from the world's light",
+        )
     if variant.source == CONSTANT:
         declare(
             b.tree, ids.CURVATURE, default=0.0, low=0.0, tip="Curvature of the whole mesh, 1/length"
@@ -213,8 +281,13 @@ def _build(b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight], table
     given = b.node("NodeGroupInput").outputs
     result = b.node("NodeGroupOutput").inputs
     total: Any = (0.0, 0.0, 0.0)
-    if lights:
-        normal = _normal(b, given[ids.NORMAL])
+    if world is not None and world.environment.is_black:
+        world = None
+    normal: Normals = {}
+    variance = None
+    if lights or (world is not None and not world.environment.is_uniform):
+        normal = _normals(b, variant, table, given)
+    if lights or (world is not None and has_bands(variant, world, table)):
         variance = _skin_variance(b, variant, given)
     for light in lights:
         node = b.group(light_group(light.kind), light.object.name)
@@ -223,16 +296,61 @@ def _build(b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight], table
         drive_light(b.tree, node, light)
         lit = node.outputs
         f = b.group(
-            reflectance_group(lookups, table),
+            reflectance_group(lookups, table, own_cosines=len(normal) > 1),
             f"Reflectance {node.name}",
-            Cosine=b.vector("DOT_PRODUCT", normal, lit[ids.DIRECTION]),
+            Cosine=_cosine(b, normal, lit[ids.DIRECTION]),
             Variance=_with_light(b, variance, lit[ids.VARIANCE], lookups, table),
         ).outputs[ids.REFLECTANCE]
         total = b.vector("MULTIPLY_ADD", f, lit[ids.RADIANCE], total)
+    if world is not None:
+        total = _with_world(b, variant, world, table, normal, variance, total)
     emission = b.node("ShaderNodeEmission")
     b.feed(emission.inputs["Color"], b.vector("MULTIPLY", total, given[ids.BASE_COLOR]))
     b.feed(emission.inputs["Strength"], given[ids.STRENGTH])
     b.feed(result[ids.SHADER], emission.outputs["Emission"])
+
+
+def has_bands(variant: Variant, world: WorldLight, table: Table) -> bool:
+    """Tell whether the skin changes the world's light: it blurs, and there is more than grey."""
+    whole = world.environment.is_uniform and table.key == SPHERE
+    return variant.source != FLAT and not whole
+
+
+def _with_world(
+    b: TreeBuilder,
+    variant: Variant,
+    world: WorldLight,
+    table: Table,
+    normal: Normals,
+    variance: Any,
+    total: Any,
+) -> Any:
+    """Add the world's light, as far as the skin lets it through."""
+    environment = world.environment
+    bands = None
+    if has_bands(variant, world, table):
+        bands = b.group(bands_group(variant.channels, table), "Bands", Variance=variance).outputs
+    light: Any = _per_set(b, normal, lambda own: harmonics_node(b, world, own, bands))
+    if environment.sun is not None:
+        sun = SceneLight(None, "SUN", environment.sun.sin2_half_angle > SMALL_SUN)
+        lookups = branch_lookups(table, variant, sun)
+        node = b.group(light_group("SUN"), "World Sun")
+        feed_sun(node, environment.sun)
+        f = b.group(
+            reflectance_group(lookups, table, own_cosines=len(normal) > 1),
+            "Reflectance World Sun",
+            Cosine=_cosine(b, normal, node.outputs[ids.DIRECTION]),
+            Variance=_with_light(b, variance, node.outputs[ids.VARIANCE], lookups, table),
+        ).outputs[ids.REFLECTANCE]
+        light = b.vector("MULTIPLY_ADD", f, node.outputs[ids.RADIANCE], light)
+    if variant.occluded:
+        distance = b.node("NodeGroupInput").outputs[ids.OCCLUSION_DISTANCE]
+        seen = occlusion_node(b, distance)
+        light = b.vector("SCALE", light, scale=seen)
+    strength = world_strength(b, world)
+    if strength is None:
+        return b.vector("ADD", light, total)
+    return b.vector("MULTIPLY_ADD", light, strength, total)
 
 
 def _with_light(b: TreeBuilder, skin: Any, light: Any, lookups: str, table: Table) -> Any:
@@ -251,11 +369,55 @@ def _with_light(b: TreeBuilder, skin: Any, light: Any, lookups: str, table: Tabl
     return b.vector("MULTIPLY_ADD", light, (share["R"], share["G"], share["B"]), skin)
 
 
-def _normal(b: TreeBuilder, given: Any) -> Any:
-    """Use the Normal input, or the geometry's where nothing is connected (a zero vector)."""
+def _normals(b: TreeBuilder, variant: Variant, table: Table, given: Any) -> Normals:
+    """The surface's own normal; under a map, blended with it as far as a channel keeps detail."""
     own = b.node("ShaderNodeNewGeometry").outputs["Normal"]
-    unset = b.math("LESS_THAN", b.vector("DOT_PRODUCT", given, given), 1e-12)
-    return b.vector("NORMALIZE", b.vector("ADD", given, b.vector("SCALE", own, scale=unset)))
+    if not variant.mapped:
+        return {"RGB": own}
+    mapped = given[ids.NORMAL]
+    # Nothing connected gives a zero vector.
+    unset = b.math("LESS_THAN", b.vector("DOT_PRODUCT", mapped, mapped), 1e-12)
+    mapped = b.vector("ADD", mapped, b.vector("SCALE", own, scale=unset))
+    change = b.vector("SUBTRACT", mapped, own)
+    ratio = dict(zip("RGB", b.separate(given[ids.SIGMA0_RATIO]), strict=True))
+    moments = dict(zip("RGB", table.moments, strict=True))
+    normals = {}
+    for shared in (SEPARATE if table.colour else variant.channels).split():
+        factor = b.math("MULTIPLY", ratio[shared[0]], math.sqrt(moments[shared[0]]))
+        weight = b.group(
+            detail_group(),
+            f"Detail {shared}",
+            Sigma0=b.math("MULTIPLY", given[ids.SIGMA0], factor),
+            Detail_Size=given[ids.DETAIL_SIZE],
+        ).outputs[ids.WEIGHT]
+        blend = b.vector("ADD", own, b.vector("SCALE", change, scale=weight))
+        normals[shared] = b.vector("NORMALIZE", blend)
+    return normals
+
+
+def _cosine(b: TreeBuilder, normals: Normals, direction: Any) -> Any:
+    """Cosine of the light with the one normal, or a vector of one for each channel."""
+    each = {
+        shared: b.vector("DOT_PRODUCT", normal, direction) for shared, normal in normals.items()
+    }
+    if len(each) == 1:
+        return next(iter(each.values()))
+    return b.combine(*(each[_set_of(channel, each)] for channel in "RGB"))
+
+
+def _per_set(b: TreeBuilder, normals: Normals, value: Callable[[Any], Any]) -> Any:
+    """A colour that depends on the normal, each channel taken at its own."""
+    if len(normals) <= 1:
+        return value(next(iter(normals.values()), None))
+    parts = {
+        shared: dict(zip("RGB", b.separate(value(normal)), strict=True))
+        for shared, normal in normals.items()
+    }
+    return b.combine(*(parts[_set_of(channel, parts)][channel] for channel in "RGB"))
+
+
+def _set_of(channel: str, sets: Iterable[str]) -> str:
+    return next(shared for shared in sets if channel in shared)
 
 
 def _skin_variance(b: TreeBuilder, variant: Variant, given: Any) -> Any:

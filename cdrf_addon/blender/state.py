@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from .. import ids
-from . import shader
+from . import gloss, shader, world
 from .image import Table, find_table
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, skin_output
@@ -29,6 +29,12 @@ def note_touched(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
     for update in depsgraph.updates:
         if update.is_updated_geometry and isinstance(update.id, bpy.types.Mesh):
             _touched.add(update.id.original.session_uid)
+
+
+@bpy.app.handlers.persistent
+def forget_worlds(*_args: object) -> None:
+    """Handler: another file was loaded."""
+    world.forget()
 
 
 @bpy.app.handlers.persistent
@@ -101,14 +107,28 @@ def reasons_to_update(
         group = node.node_tree
         if skin_output(slot.material) is None:
             reasons.append("The CDRF Material Output was deleted.")
+        if gloss.is_due(slot.material):
+            reasons.append("The Principled node was changed: its gloss is that of before.")
         if group.get(ids.SCENE_KEY) != scene.name:
             reasons.append(f"'{slot.material.name}' was set up in another scene.")
         due = lights_due(group, lights)
         if due:
             reasons.append(f"Lights: {due}.")
+        if not playing and world.is_due(group, world.scene_world(scene, view_layer)):
+            reasons.append("The world's light was changed.")
         variant = shader.stamped_variant(group)
+        if node.inputs[ids.NORMAL].is_linked != variant.mapped:
+            done = "taken off" if variant.mapped else "connected to"
+            reasons.append(f"A normal map was {done} the CDRF node.")
         ratio = tuple(node.inputs[ids.SIGMA0_RATIO].default_value)
-        if shader.variant_of(ratio, variant.source, variant.model) != variant:
+        wanted = shader.variant_of(
+            ratio,
+            variant.source,
+            variant.model,
+            mapped=variant.mapped,
+            occluded=variant.occluded,
+        )
+        if wanted != variant:
             reasons.append("The colour ratio was changed in the node.")
         if variant.source in {shader.ATTRIBUTE, shader.SCALED} and not has_curvature(item.data):
             reasons.append(f"'{item.name}' has no curvature yet.")

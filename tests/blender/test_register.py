@@ -34,7 +34,7 @@ def traces() -> dict[str, Any]:
 def test_enable_disable_enable(_enabled: None) -> None:
     with_it = traces()
     assert with_it["operators"] == OPERATORS
-    assert with_it["material"] and with_it["mesh"] and len(with_it["handlers"]) == 4
+    assert with_it["material"] and with_it["mesh"] and len(with_it["handlers"]) == 5
     bpy.ops.preferences.addon_disable(module="cdrf_addon")
     gone = traces()
     assert not any(gone.values()), gone

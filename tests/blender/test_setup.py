@@ -124,7 +124,7 @@ def test_slider_never_rebuilds_the_table(rig: Rig) -> None:
     rig.light("SUN")
     item = torus()
     bpy.ops.cdrf.setup()
-    image = bpy.data.images[ids.LUT_IMAGE]
+    image = bpy.data.images[f"{ids.LUT_IMAGE} Sphere"]
     groups = {group.name: len(group.nodes) for group in bpy.data.node_groups}
     for value in (0.0, 1e-6, 0.5, 1e4):
         item.data.materials[0].cdrf.sigma0 = value
@@ -355,7 +355,7 @@ def test_save_and_reload_keeps_everything(rig: Rig, tmp_path: Path) -> None:
     item.data.materials[0].cdrf.sigma0 = 0.123
     item.name = "Kept"
     values = attribute(item.data)
-    image = bpy.data.images[ids.LUT_IMAGE]
+    image = bpy.data.images[f"{ids.LUT_IMAGE} Sphere"]
     table = np.array(image.pixels)
     file = tmp_path / "kept.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
@@ -363,7 +363,7 @@ def test_save_and_reload_keeps_everything(rig: Rig, tmp_path: Path) -> None:
     item = bpy.data.objects["Kept"]
     assert item.data.materials[0].cdrf.sigma0 == pytest.approx(0.123)
     assert np.array_equal(attribute(item.data), values)
-    image = bpy.data.images[ids.LUT_IMAGE]
+    image = bpy.data.images[f"{ids.LUT_IMAGE} Sphere"]
     assert image.packed_file is not None and image.is_float
     assert image.colorspace_settings.is_data
     assert np.array_equal(np.array(image.pixels), table), "the packed table is exact"
@@ -421,7 +421,7 @@ def test_deleted_parts_come_back_at_the_next_update(rig: Rig) -> None:
         return not reasons and linked and is_intact(cdrf_node(item).node_tree)
 
     assert whole()
-    bpy.data.images.remove(bpy.data.images[ids.LUT_IMAGE])
+    bpy.data.images.remove(bpy.data.images[f"{ids.LUT_IMAGE} Sphere"])
     assert not whole()
     bpy.ops.cdrf.update()
     assert whole()
