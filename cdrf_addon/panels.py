@@ -46,10 +46,13 @@ def draw_skin(
     if not node.inputs[ids.BASE_COLOR].is_linked:
         column.prop(node.inputs[ids.BASE_COLOR], "default_value", text="Base Color")
     column.prop(node.inputs[ids.STRENGTH], "default_value", text="Strength")
+    column.prop(material.cdrf, "shadows")
     wired = shader.wired_lights(node.node_tree)
     lookups = sum(len(shared.split()) for *_, shared in wired)
     plural = "" if lookups == 1 else "s"
-    layout.label(text=f"{lookups} look-up{plural} for {len(wired)} light(s)", icon="TEXTURE")
+    shadowed = ", shadows" if shader.stamped_variant(node.node_tree).shadows else ""
+    text = f"{lookups} look-up{plural} for {len(wired)} light(s){shadowed}"
+    layout.label(text=text, icon="TEXTURE")
     if not material.is_editable:
         _wrapped(layout, "Linked: make it local to change it.", _characters(context), "LINKED")
 

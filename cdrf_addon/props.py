@@ -19,6 +19,7 @@ from bpy.props import (
 from . import ids
 from .blender import reflectance_models
 from .blender.materials import cdrf_node
+from .blender.shadows import AUTO, SHADOW_ITEMS
 from .core.errors import CdrfError
 from .core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
 from .core.mesh import NO_CREASE
@@ -80,6 +81,10 @@ def _profile_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
     if reflectance_models.kind_of_model(self.id_data) == PROFILE:
         with contextlib.suppress(CdrfError):
             reflectance_models.set_kind(self.id_data, PROFILE)
+
+
+def _shadows_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
+    reflectance_models.refresh_shadows(self.id_data)
 
 
 class CdrfMaterial(bpy.types.PropertyGroup):
@@ -145,6 +150,17 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         ],
         default=SPHERE,
         update=_profile_changed,
+        options=set(),
+    )
+    shadows: EnumProperty(
+        name="Shadows",
+        description=(
+            "Whether other objects, and distant parts of this one, cast shadows on the surface. "
+            "Its own terminator stays soft. Shadows cost more than light does"
+        ),
+        items=SHADOW_ITEMS,
+        default=AUTO,
+        update=_shadows_changed,
         options=set(),
     )
     chosen_model: StringProperty(options={"HIDDEN"})

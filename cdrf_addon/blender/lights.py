@@ -43,6 +43,8 @@ class SceneLight:
     """Type of the light, and shape of an area light: "SUN", "AREA ELLIPSE"."""
     soft: bool = True
     """Whether it is, or may become, so large that its size blurs the terminator visibly."""
+    casts: bool = True
+    """Whether it casts shadows, or may come to by animation."""
 
     @property
     def type(self) -> str:
@@ -65,6 +67,11 @@ def is_soft(item: bpy.types.Object) -> bool:
     return bool(light.shadow_soft_size > 0.0)
 
 
+def casts_shadow(light: bpy.types.Light) -> bool:
+    """Tell whether a light casts shadows, or may come to by animation."""
+    return bool(light.use_shadow) or light.animation_data is not None
+
+
 def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[SceneLight]:
     """List the lights that a render of this view layer would use, by name.
 
@@ -77,7 +84,8 @@ def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> lis
             continue
         if item.hide_render and not _animates(item, "hide_render"):
             continue
-        found.append(SceneLight(item, kind_of(item.data), is_soft(item)))
+        light = item.data
+        found.append(SceneLight(item, kind_of(light), is_soft(item), casts_shadow(light)))
     return sorted(found, key=lambda light: light.object.name)
 
 

@@ -33,6 +33,7 @@ from .image import ensure_table, find_table, table_of
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
 from .read_material import Scattering
+from .shadows import wants_shadows
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -161,17 +162,40 @@ def change_variant(
     material: bpy.types.Material,
     ratio: Sequence[float] | None = None,
     model: str | None = None,
+    shadows: bool | None = None,
 ) -> None:
-    """Swap a translucent material's shader group for one of another ratio or model."""
+    """Swap a translucent material's shader group for one of another ratio, model or shadows."""
     node = cdrf_node(material)
     if node is None:
         return
     now = shader.stamped_variant(node.node_tree)
     channels = node.inputs[ids.SIGMA0_RATIO].default_value if ratio is None else ratio
-    wanted = shader.variant_of(tuple(channels), now.source, now.model if model is None else model)
     where = scene_of_group(node.node_tree)
+    wanted = shader.variant_of(
+        tuple(channels),
+        now.source,
+        now.model if model is None else model,
+        shadows=now.shadows if shadows is None else shadows,
+    )
     if wanted != now and where is not None:
         install(material, shader.ensure_shader_group(wanted, *where))
+
+
+def refresh_shadows(material: bpy.types.Material) -> None:
+    """Give a translucent material's group shadows, or take them out, as its setting says."""
+    node = cdrf_node(material)
+    if node is None or not material.is_editable:
+        return
+    layer = _view_layer(node.node_tree)
+    if layer is not None:
+        change_variant(material, shadows=wants_shadows(material, layer))
+
+
+def _view_layer(group: bpy.types.ShaderNodeTree) -> bpy.types.ViewLayer | None:
+    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
+    if scene is None or bpy.context.scene == scene:
+        return bpy.context.view_layer
+    return scene.view_layers[0]
 
 
 def scene_of_group(
@@ -181,6 +205,4 @@ def scene_of_group(
     scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
     if scene is None:
         return None
-    current = bpy.context.view_layer
-    layer = current if bpy.context.scene == scene else scene.view_layers[0]
-    return scene, scene_lights(scene, layer)
+    return scene, scene_lights(scene, _view_layer(group))

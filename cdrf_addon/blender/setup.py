@@ -36,7 +36,7 @@ from ..core.summary import (
     CurvatureSummary,
     summarise,
 )
-from . import display, reflectance_models, shader, state
+from . import display, reflectance_models, shader, shadows, state
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
 from .mesh_io import (
@@ -414,7 +414,12 @@ class Setup:
         settings = material.cdrf
         fresh = cdrf_node(material) is None
         ratio = tuple(settings.sigma0_ratio)
-        wanted = shader.variant_of(ratio, source, reflectance_models.ensure_chosen(material))
+        wanted = shader.variant_of(
+            ratio,
+            source,
+            reflectance_models.ensure_chosen(material),
+            shadows=shadows.wants_shadows(material, self.view_layer),
+        )
         group = shader.ensure_shader_group(wanted, self.scene, lights)
         node = install(material, group)
         work = self._work_of(material)

@@ -8,7 +8,7 @@ each model of reflectance; the branches are one per light. Wiring:
                      -> x Sigma0 x Ratio -> squared = variance --------+
     Normal (or geometry) --+                                          |
     light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance/moment
-            -> Radiance ------------------------------> x f --> sum over i --> x Base Color
+            -> Radiance (x visibility: shadows.py) ---> x f --> sum over i --> x Base Color
                                                                            x Strength -> Emission
 """
 
@@ -22,12 +22,13 @@ import bpy
 
 from .. import ids
 from ..core.models import RING, name_of
+from . import shadows
 from .groups import SEPARATE, diffused_group, light_group, reflectance_group
 from .image import Table, find_table, table_of
 from .lights import SceneLight, drive_light
 from .nodetree import TreeBuilder, declare, is_intact, rebuild
 
-VERSION = 5
+VERSION = 6
 
 # A channel narrower than a hundredth of the widest is Lambert in every row of the table.
 LEAST_MOMENT = 1e-4
@@ -46,22 +47,27 @@ class Variant:
     """FLAT, CONSTANT, ATTRIBUTE or SCALED."""
     model: str
     """Key of the model of reflectance."""
+    shadows: bool = False
+    """Whether the lights' cast shadows fall on the surface."""
 
     @property
     def name(self) -> str:
         """Name of the node group."""
         lookups = "+".join(self.channels.split())
         source = "" if self.source == ATTRIBUTE else f" {self.source}"
-        return f"CDRF {name_of(self.model)} {lookups}{source}"
+        shadowed = " shadows" if self.shadows else ""
+        return f"CDRF {name_of(self.model)} {lookups}{source}{shadowed}"
 
 
-def variant_of(ratio: Sequence[float], source: str, model: str) -> Variant:
+def variant_of(
+    ratio: Sequence[float], source: str, model: str, *, shadows: bool = False
+) -> Variant:
     """Choose the variant with one look-up per distinct sigma0.
 
     A flat mesh has sigma = 0 in every channel, whatever the ratio: one look-up.
     """
     if source == FLAT:
-        return Variant("RGB", FLAT, model)
+        return Variant("RGB", FLAT, model, shadows)
     red, green, blue = ratio
     if red == green == blue:
         channels = "RGB"
@@ -73,7 +79,7 @@ def variant_of(ratio: Sequence[float], source: str, model: str) -> Variant:
         channels = "RB G"
     else:
         channels = "R G B"
-    return Variant(channels, source, model)
+    return Variant(channels, source, model, shadows)
 
 
 def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
@@ -81,7 +87,12 @@ def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
 
     The paper's ring was the only model before version 5.
     """
-    return Variant(group[ids.CHANNELS_KEY], group[ids.SOURCE_KEY], group.get(ids.MODEL_KEY, RING))
+    return Variant(
+        group[ids.CHANNELS_KEY],
+        group[ids.SOURCE_KEY],
+        group.get(ids.MODEL_KEY, RING),
+        bool(group.get(ids.SHADOW_KEY, False)),
+    )
 
 
 def branch_lookups(table: Table, variant: Variant, light: SceneLight) -> str:
@@ -109,13 +120,16 @@ def ensure_shader_group(
         group[ids.CHANNELS_KEY] = variant.channels
         group[ids.SOURCE_KEY] = variant.source
         group[ids.MODEL_KEY] = variant.model
+        group[ids.SHADOW_KEY] = variant.shadows
         group[ids.SCENE_KEY] = scene.name
         group.color_tag = "SHADER"
         group.description = "Curvature-dependent translucency (Kubo et al. 2011), made by CDRF"
     elif is_current(group, lights):
         return group
     table = table_of(variant.model)
-    rebuild(group, lambda builder: _build(builder, variant, lights, table))
+    world = shadows.world_shines(scene.world)
+    rebuild(group, lambda builder: _build(builder, variant, lights, table, world))
+    group[ids.WORLD_KEY] = world
     group[ids.VERSION_KEY] = VERSION
     return group
 
@@ -141,7 +155,23 @@ def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) ->
     if table is None:
         return False
     wanted = {(light.object, light.kind, branch_lookups(table, variant, light)) for light in lights}
-    return set(wired_lights(group)) == wanted
+    return set(wired_lights(group)) == wanted and not shadows_due(group, lights)
+
+
+def shadows_due(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -> str:
+    """Say how the shadows differ from those the group was made for; empty if they do not."""
+    if not stamped_variant(group).shadows:
+        return ""
+    wired = {node.name for node in group.nodes if node.get(ids.SHADOW_KEY)}
+    targets = _targets(group)
+    casting = {targets.get(name) for name in wired}
+    changed = [light for light in lights if light.casts != (light.object in casting)]
+    if changed:
+        return f"light '{changed[0].object.name}' casts shadows now, or no more"
+    scene = bpy.data.scenes.get(group[ids.SCENE_KEY])
+    if wired and scene and shadows.world_shines(scene.world) != group.get(ids.WORLD_KEY):
+        return "the world's light was switched on or off"
+    return ""
 
 
 def wired_lights(
@@ -153,17 +183,23 @@ def wired_lights(
 
     The drivers' targets are asked, not names: they survive renaming.
     """
+    targets = _targets(group)
+    return [
+        (targets.get(node.name), node[ids.LIGHT_KEY], node.get(ids.LOOKUPS_KEY, ""))
+        for node in group.nodes
+        if ids.LIGHT_KEY in node
+    ]
+
+
+def _targets(group: bpy.types.ShaderNodeTree) -> dict[str, bpy.types.Object | None]:
+    """Map the names of the light nodes to the lights that drive them."""
     targets: dict[str, bpy.types.Object | None] = {}
     if group.animation_data is not None:
         for curve in group.animation_data.drivers:
             escaped = curve.data_path.removeprefix('nodes["').partition('"].inputs["')[0]
             target = curve.driver.variables[0].targets[0].id
             targets[bpy.utils.unescape_identifier(escaped)] = target
-    return [
-        (targets.get(node.name), node[ids.LIGHT_KEY], node.get(ids.LOOKUPS_KEY, ""))
-        for node in group.nodes
-        if ids.LIGHT_KEY in node
-    ]
+    return targets
 
 
 def _declare(tree: bpy.types.ShaderNodeTree) -> None:
@@ -204,7 +240,9 @@ def _declare(tree: bpy.types.ShaderNodeTree) -> None:
     declare(tree, ids.SHADER, "Shader", output=True)
 
 
-def _build(b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight], table: Table) -> None:
+def _build(
+    b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight], table: Table, world: bool
+) -> None:
     _declare(b.tree)
     if variant.source == CONSTANT:
         declare(
@@ -216,23 +254,56 @@ def _build(b: TreeBuilder, variant: Variant, lights: Sequence[SceneLight], table
     if lights:
         normal = _normal(b, given[ids.NORMAL])
         variance = _skin_variance(b, variant, given)
-    for light in lights:
-        node = b.group(light_group(light.kind), light.object.name)
-        node[ids.LIGHT_KEY] = light.kind
-        node[ids.LOOKUPS_KEY] = lookups = branch_lookups(table, variant, light)
-        drive_light(b.tree, node, light)
+    branches = [_light_node(b, variant, light, table) for light in lights]
+    visible = {}
+    if variant.shadows and any(light.casts for light in lights):
+        visible = _visibilities(b, branches, lights, normal, world)
+        declare(b.tree, ids.THICKNESS, output=True, tip="Where the surface's own shadow begins")
+        reach = shadows.thickness(b, given[ids.SIGMA0], given[ids.SIGMA0_RATIO])
+        b.feed(result[ids.THICKNESS], reach)
+    for number, node in enumerate(branches):
         lit = node.outputs
+        lookups = node[ids.LOOKUPS_KEY]
         f = b.group(
             reflectance_group(lookups, table),
             f"Reflectance {node.name}",
             Cosine=b.vector("DOT_PRODUCT", normal, lit[ids.DIRECTION]),
             Variance=_with_light(b, variance, lit[ids.VARIANCE], lookups, table),
         ).outputs[ids.REFLECTANCE]
-        total = b.vector("MULTIPLY_ADD", f, lit[ids.RADIANCE], total)
+        radiance = lit[ids.RADIANCE]
+        if number in visible:
+            radiance = b.vector("SCALE", radiance, scale=visible[number])
+        total = b.vector("MULTIPLY_ADD", f, radiance, total)
     emission = b.node("ShaderNodeEmission")
     b.feed(emission.inputs["Color"], b.vector("MULTIPLY", total, given[ids.BASE_COLOR]))
     b.feed(emission.inputs["Strength"], given[ids.STRENGTH])
     b.feed(result[ids.SHADER], emission.outputs["Emission"])
+
+
+def _light_node(
+    b: TreeBuilder, variant: Variant, light: SceneLight, table: Table
+) -> bpy.types.ShaderNode:
+    """Add the node of a light, driven by it and stamped with what it was wired for."""
+    node = b.group(light_group(light.kind), light.object.name)
+    node[ids.LIGHT_KEY] = light.kind
+    node[ids.LOOKUPS_KEY] = branch_lookups(table, variant, light)
+    node[ids.SHADOW_KEY] = variant.shadows and light.casts
+    drive_light(b.tree, node, light)
+    return node
+
+
+def _visibilities(
+    b: TreeBuilder,
+    nodes: Sequence[bpy.types.ShaderNode],
+    lights: Sequence[SceneLight],
+    normal: Any,
+    world: bool,
+) -> dict[int, Any]:
+    branches = [
+        shadows.Branch(node.outputs[ids.DIRECTION], node.outputs[ids.RADIANCE], light.casts)
+        for node, light in zip(nodes, lights, strict=True)
+    ]
+    return shadows.Shadows(b, branches, normal, world=world).visibilities()
 
 
 def _with_light(b: TreeBuilder, skin: Any, light: Any, lookups: str, table: Table) -> Any:

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from .. import ids
-from . import shader
+from . import shader, shadows
 from .image import Table, find_table
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, skin_output
@@ -76,6 +76,8 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
     if not parts:
         resized = [light.object.name for light in lights if _other_lookups(group, table, light)]
         parts = [f"light '{name}' got another size" for name in resized]
+    if not parts:
+        parts = [part for part in (shader.shadows_due(group, lights),) if part]
     return "; ".join(parts) or "the node group is incomplete or of an older version"
 
 
@@ -108,7 +110,13 @@ def reasons_to_update(
             reasons.append(f"Lights: {due}.")
         variant = shader.stamped_variant(group)
         ratio = tuple(node.inputs[ids.SIGMA0_RATIO].default_value)
-        if shader.variant_of(ratio, variant.source, variant.model) != variant:
+        shadowed = shadows.wants_shadows(slot.material, view_layer)
+        if shadowed and not variant.shadows:
+            reasons.append("Shadows: an object that can cast one is new.")
+        elif variant.shadows and not shadowed:
+            reasons.append("Shadows: nothing casts one any more.")
+        wanted = shader.variant_of(ratio, variant.source, variant.model, shadows=variant.shadows)
+        if wanted != variant:
             reasons.append("The colour ratio was changed in the node.")
         if variant.source in {shader.ATTRIBUTE, shader.SCALED} and not has_curvature(item.data):
             reasons.append(f"'{item.name}' has no curvature yet.")
