@@ -9,7 +9,7 @@ import bpy
 
 from . import ids
 from .blender import display, materials, reflectance_models, shader, state
-from .compat import EEVEE
+from .compat import EEVEE, HAS_RAYCAST
 from .core.estimators import METHODS
 from .core.models import MODEL_ITEMS, PROFILE
 from .core.summary import CONSTANT, FLAT, VARYING
@@ -47,11 +47,14 @@ def draw_skin(
         column.prop(node.inputs[ids.BASE_COLOR], "default_value", text="Base Color")
     column.prop(node.inputs[ids.STRENGTH], "default_value", text="Strength")
     column.prop(material.cdrf, "shadows")
+    shadowed = shader.stamped_variant(node.node_tree).shadows
+    if shadowed.cast and HAS_RAYCAST:
+        column.prop(material.cdrf, "shadow_edges")
     wired = shader.wired_lights(node.node_tree)
     lookups = sum(len(shared.split()) for *_, shared in wired)
     plural = "" if lookups == 1 else "s"
-    shadowed = ", shadows" if shader.stamped_variant(node.node_tree).shadows else ""
-    text = f"{lookups} look-up{plural} for {len(wired)} light(s){shadowed}"
+    text = f"{lookups} look-up{plural} for {len(wired)} light(s)"
+    text += ", shadows" if shadowed.cast else ""
     layout.label(text=text, icon="TEXTURE")
     if not material.is_editable:
         _wrapped(layout, "Linked: make it local to change it.", _characters(context), "LINKED")

@@ -8,6 +8,7 @@ import math
 
 import bpy
 from bpy.props import (
+    BoolProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -160,6 +161,16 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         ),
         items=SHADOW_ITEMS,
         default=AUTO,
+        update=_shadows_changed,
+        options=set(),
+    )
+    shadow_edges: BoolProperty(
+        name="Coloured Edges",
+        description=(
+            "Soften the edges of shadows as far as each colour scatters. From Blender 5.1 on, for "
+            "occluders that the camera sees; needs some samples to be free of noise"
+        ),
+        default=True,
         update=_shadows_changed,
         options=set(),
     )

@@ -33,7 +33,7 @@ from .image import ensure_table, find_table, table_of
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
 from .read_material import Scattering
-from .shadows import wants_shadows
+from .shadows import Choice, choose
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -162,7 +162,7 @@ def change_variant(
     material: bpy.types.Material,
     ratio: Sequence[float] | None = None,
     model: str | None = None,
-    shadows: bool | None = None,
+    shadows: Choice | None = None,
 ) -> None:
     """Swap a translucent material's shader group for one of another ratio, model or shadows."""
     node = cdrf_node(material)
@@ -188,7 +188,7 @@ def refresh_shadows(material: bpy.types.Material) -> None:
         return
     layer = _view_layer(node.node_tree)
     if layer is not None:
-        change_variant(material, shadows=wants_shadows(material, layer))
+        change_variant(material, shadows=choose(material, layer))
 
 
 def _view_layer(group: bpy.types.ShaderNodeTree) -> bpy.types.ViewLayer | None:

@@ -418,7 +418,7 @@ class Setup:
             ratio,
             source,
             reflectance_models.ensure_chosen(material),
-            shadows=shadows.wants_shadows(material, self.view_layer),
+            shadows=shadows.choose(material, self.view_layer),
         )
         group = shader.ensure_shader_group(wanted, self.scene, lights)
         node = install(material, group)

@@ -27,6 +27,8 @@ from .groups import SEPARATE, diffused_group, light_group, reflectance_group
 from .image import Table, find_table, table_of
 from .lights import SceneLight, drive_light
 from .nodetree import TreeBuilder, declare, is_intact, rebuild
+from .shadow_edge import edge_group
+from .shadows import NO_SHADOWS, Choice
 
 VERSION = 6
 
@@ -47,20 +49,21 @@ class Variant:
     """FLAT, CONSTANT, ATTRIBUTE or SCALED."""
     model: str
     """Key of the model of reflectance."""
-    shadows: bool = False
-    """Whether the lights' cast shadows fall on the surface."""
+    shadows: Choice = NO_SHADOWS
+    """Whether the lights' cast shadows fall on the surface, and how."""
 
     @property
     def name(self) -> str:
         """Name of the node group."""
         lookups = "+".join(self.channels.split())
         source = "" if self.source == ATTRIBUTE else f" {self.source}"
-        shadowed = " shadows" if self.shadows else ""
+        shadowed = " shadows" if self.shadows.cast else ""
+        shadowed += " coloured" if self.shadows.edges else ""
         return f"CDRF {name_of(self.model)} {lookups}{source}{shadowed}"
 
 
 def variant_of(
-    ratio: Sequence[float], source: str, model: str, *, shadows: bool = False
+    ratio: Sequence[float], source: str, model: str, *, shadows: Choice = NO_SHADOWS
 ) -> Variant:
     """Choose the variant with one look-up per distinct sigma0.
 
@@ -91,7 +94,7 @@ def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
         group[ids.CHANNELS_KEY],
         group[ids.SOURCE_KEY],
         group.get(ids.MODEL_KEY, RING),
-        bool(group.get(ids.SHADOW_KEY, False)),
+        Choice(bool(group.get(ids.SHADOW_KEY, False)), bool(group.get(ids.EDGE_KEY, False))),
     )
 
 
@@ -120,7 +123,8 @@ def ensure_shader_group(
         group[ids.CHANNELS_KEY] = variant.channels
         group[ids.SOURCE_KEY] = variant.source
         group[ids.MODEL_KEY] = variant.model
-        group[ids.SHADOW_KEY] = variant.shadows
+        group[ids.SHADOW_KEY] = variant.shadows.cast
+        group[ids.EDGE_KEY] = variant.shadows.edges
         group[ids.SCENE_KEY] = scene.name
         group.color_tag = "SHADER"
         group.description = "Curvature-dependent translucency (Kubo et al. 2011), made by CDRF"
@@ -160,7 +164,7 @@ def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) ->
 
 def shadows_due(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -> str:
     """Say how the shadows differ from those the group was made for; empty if they do not."""
-    if not stamped_variant(group).shadows:
+    if not stamped_variant(group).shadows.cast:
         return ""
     wired = {node.name for node in group.nodes if node.get(ids.SHADOW_KEY)}
     targets = _targets(group)
@@ -256,7 +260,7 @@ def _build(
         variance = _skin_variance(b, variant, given)
     branches = [_light_node(b, variant, light, table) for light in lights]
     visible = {}
-    if variant.shadows and any(light.casts for light in lights):
+    if variant.shadows.cast and any(light.casts for light in lights):
         visible = _visibilities(b, branches, lights, normal, world)
         declare(b.tree, ids.THICKNESS, output=True, tip="Where the surface's own shadow begins")
         reach = shadows.thickness(b, given[ids.SIGMA0], given[ids.SIGMA0_RATIO])
@@ -271,7 +275,16 @@ def _build(
             Variance=_with_light(b, variance, lit[ids.VARIANCE], lookups, table),
         ).outputs[ids.REFLECTANCE]
         radiance = lit[ids.RADIANCE]
-        if number in visible:
+        if number in visible and variant.shadows.edges:
+            edge = b.group(
+                edge_group(),
+                f"Shadow Edge {node.name}",
+                Visibility=visible[number],
+                Direction=lit[ids.DIRECTION],
+                Width=b.vector("SCALE", given[ids.SIGMA0_RATIO], scale=given[ids.SIGMA0]),
+            )
+            radiance = b.vector("MULTIPLY", radiance, edge.outputs[ids.VISIBILITY])
+        elif number in visible:
             radiance = b.vector("SCALE", radiance, scale=visible[number])
         total = b.vector("MULTIPLY_ADD", f, radiance, total)
     emission = b.node("ShaderNodeEmission")
@@ -287,7 +300,7 @@ def _light_node(
     node = b.group(light_group(light.kind), light.object.name)
     node[ids.LIGHT_KEY] = light.kind
     node[ids.LOOKUPS_KEY] = branch_lookups(table, variant, light)
-    node[ids.SHADOW_KEY] = variant.shadows and light.casts
+    node[ids.SHADOW_KEY] = variant.shadows.cast and light.casts
     drive_light(b.tree, node, light)
     return node
 

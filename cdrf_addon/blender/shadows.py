@@ -28,6 +28,7 @@ from typing import Any
 import bpy
 
 from .. import ids
+from ..compat import HAS_RAYCAST
 from .nodetree import TreeBuilder, declare, ensure_group
 
 VERSION = 1
@@ -39,6 +40,17 @@ SHADOW_ITEMS = [
     (OFF, "Off", "No cast shadows: faster"),
 ]
 
+
+@dataclass(frozen=True)
+class Choice:
+    """What a material's shadows are made of."""
+
+    cast: bool = False
+    edges: bool = False
+    """Whether their edges are softened and coloured as far as light scatters."""
+
+
+NO_SHADOWS = Choice()
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD"}
 # Shading at a distance of 3 sigma0 behind a terminator is below a thousandth of the peak.
 REACH = 3.0
@@ -82,10 +94,12 @@ def world_shines(world: bpy.types.World | None) -> bool:
     return not black and (strength.is_linked or strength.default_value != 0.0)
 
 
-def wants_shadows(material: bpy.types.Material, view_layer: bpy.types.ViewLayer) -> bool:
-    """Decide whether a material's lights get shadows."""
-    choice = material.cdrf.shadows
-    return choice == ON or (choice == AUTO and _casters(view_layer) > 1)
+def choose(material: bpy.types.Material, view_layer: bpy.types.ViewLayer) -> Choice:
+    """Decide what shadows a material's lights get."""
+    setting = material.cdrf.shadows
+    if setting == ON or (setting == AUTO and _casters(view_layer) > 1):
+        return Choice(True, HAS_RAYCAST and material.cdrf.shadow_edges)
+    return NO_SHADOWS
 
 
 def _casters(view_layer: bpy.types.ViewLayer) -> int:

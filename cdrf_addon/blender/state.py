@@ -110,10 +110,10 @@ def reasons_to_update(
             reasons.append(f"Lights: {due}.")
         variant = shader.stamped_variant(group)
         ratio = tuple(node.inputs[ids.SIGMA0_RATIO].default_value)
-        shadowed = shadows.wants_shadows(slot.material, view_layer)
-        if shadowed and not variant.shadows:
+        shadowed = shadows.choose(slot.material, view_layer).cast
+        if shadowed and not variant.shadows.cast:
             reasons.append("Shadows: an object that can cast one is new.")
-        elif variant.shadows and not shadowed:
+        elif variant.shadows.cast and not shadowed:
             reasons.append("Shadows: nothing casts one any more.")
         wanted = shader.variant_of(ratio, variant.source, variant.model, shadows=variant.shadows)
         if wanted != variant:

@@ -3,7 +3,7 @@
 
     ./dev python tests/benchmarks/shadows.py [--pictures FOLDER]       about ten minutes
 
-Reference: Cycles' Random Walk subsurface scattering, no light between surfaces. Scatter distances are
+Reference: Cycles, Random Walk, no light between surfaces. Scatter distances are
 those that Make Translucent reads from the same node; nothing is fitted.
 """
 
