@@ -37,7 +37,7 @@ from ..core.summary import (
     summarise,
 )
 from . import display, reflectance_models, shader, shadows, state
-from .lights import SceneLight, scene_lights
+from .lights import SceneLight, is_linked_to_some, scene_lights
 from .materials import cdrf_node, install, require_editable
 from .mesh_io import (
     Shape,
@@ -458,6 +458,13 @@ class Setup:
                     f"The lights inside the instance '{item.name}' do not reach the surface: "
                     "make them real (Object > Apply > Make Instances Real)."
                 )
+        limited = [light.object.name for light in lights if is_linked_to_some(light.object)]
+        if limited:
+            report.warnings.append(
+                f"The light '{limited[0]}' is linked to some objects only, which the translucent "
+                "surface does not heed: exclude the light's collection from this view layer, or "
+                "lower its power, if it should not shine here."
+            )
         if not lights:
             report.warnings.append("The scene has no light that renders, so the surface is black.")
         if self.scene.render.engine not in {EEVEE, "BLENDER_WORKBENCH"}:
