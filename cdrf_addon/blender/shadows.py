@@ -52,8 +52,8 @@ class Choice:
 
 NO_SHADOWS = Choice()
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD"}
-# Shading at a distance of 3 sigma0 behind a terminator is below a thousandth of the peak.
-REACH = 3.0
+# What bleeds further than half of this behind a terminator is below a thousandth of the peak.
+REACH = 5.0
 # Without any thickness the BSDF would be another one, lit by its normal.
 LEAST_THICKNESS = 1e-5
 # More lights than space has dimensions cannot be told apart by perpendicular normals.

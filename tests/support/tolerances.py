@@ -33,3 +33,13 @@ DIFFUSE = Bound(
 # (64 texels over N.L in [-1, 1]); a pixel that close to the terminator says nothing about ours.
 DIFFUSE_TERMINATOR = 0.01
 DIFFUSE_AT_TERMINATOR = Bound(9e-3, 9e-3, "EEVEE's table: half a texel of 1/63 at N.L = 0")
+SHADOW = Bound(
+    8e-3,
+    2e-3,
+    "clear of edges, in a peak of 1/2: EEVEE's horizon table leaves 0.8 % of a light in the plane "
+    "where another is measured; bleeding beyond 5 sigma0 is cut",
+)
+SHADOW_OF_MANY = Bound(0.3, 1e-2, "one mask for all lights darkens those that are not blocked")
+SHADOW_WORLD = Bound(
+    2e-2, 1e-2, "EEVEE's world light is not quite the even function that is taken off"
+)
