@@ -275,7 +275,7 @@ def _build(
             Variance=_with_light(b, variance, lit[ids.VARIANCE], lookups, table),
         ).outputs[ids.REFLECTANCE]
         radiance = lit[ids.RADIANCE]
-        if number in visible and variant.shadows.edges:
+        if number in visible and variant.shadows.edges and len(visible) <= shadows.MOST_ISOLATED:
             edge = b.group(
                 edge_group(),
                 f"Shadow Edge {node.name}",
