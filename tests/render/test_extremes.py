@@ -113,9 +113,9 @@ def test_curvature_that_is_not_a_number(rig: Rig) -> None:
     attribute = ball.data.attributes[ids.DIFFUSED_ATTRIBUTE].data
     values = np.empty(4 * len(attribute), dtype=np.float32)
     attribute.foreach_get("color", values)
-    values = values.reshape(-1, 4)
+    table = values.reshape(-1, 4)
     for number, bad in enumerate((math.nan, math.inf, -math.inf, 1e30, -1.0)):
-        values[number::7] = bad
+        table[number::7] = bad
     attribute.foreach_set("color", values.ravel())
     ball.data.update()
     assert np.isfinite(rig.render()).all()
