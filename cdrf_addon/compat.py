@@ -13,6 +13,10 @@ EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT
 """Identifier of the EEVEE engine in `scene.render.engine`."""
 
 
+HAS_RAYCAST = bpy.app.version >= (5, 1, 0)
+"""Whether shader trees know the Raycast node, which coloured shadow edges need."""
+
+
 def set_still_format(settings: bpy.types.ImageFormatSettings, kind: str) -> None:
     """Make renders write single pictures; from 5.0 on a scene may be set to video or layers."""
     if hasattr(settings, "media_type"):

@@ -9,7 +9,7 @@ import bpy
 
 from . import ids
 from .blender import display, gloss, materials, reflectance_models, shader, state, world
-from .compat import EEVEE
+from .compat import EEVEE, HAS_RAYCAST
 from .core.estimators import METHODS
 from .core.models import MODEL_ITEMS, PROFILE
 from .core.summary import CONSTANT, FLAT, VARYING
@@ -48,10 +48,16 @@ def draw_skin(
     column.prop(node.inputs[ids.STRENGTH], "default_value", text="Strength")
     if ids.DETAIL_SIZE in node.inputs:
         column.prop(node.inputs[ids.DETAIL_SIZE], "default_value", text="Detail Size")
+    column.prop(material.cdrf, "shadows")
+    shadowed = shader.stamped_variant(node.node_tree).shadows
+    if shadowed.cast and HAS_RAYCAST:
+        column.prop(material.cdrf, "shadow_edges")
     wired = shader.wired_lights(node.node_tree)
     lookups = sum(len(shared.split()) for *_, shared in wired)
     plural = "" if lookups == 1 else "s"
-    layout.label(text=f"{lookups} look-up{plural} for {len(wired)} light(s)", icon="TEXTURE")
+    text = f"{lookups} look-up{plural} for {len(wired)} light(s)"
+    text += ", shadows" if shadowed.cast else ""
+    layout.label(text=text, icon="TEXTURE")
     if not material.is_editable:
         _wrapped(layout, "Linked: make it local to change it.", _characters(context), "LINKED")
 

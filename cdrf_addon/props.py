@@ -21,6 +21,7 @@ from . import ids
 from .blender import gloss, reflectance_models
 from .blender.materials import cdrf_node
 from .blender.shader import stamped_variant
+from .blender.shadows import AUTO, SHADOW_ITEMS
 from .core.errors import CdrfError
 from .core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
 from .core.mesh import NO_CREASE
@@ -109,6 +110,10 @@ def _set_gloss(self: CdrfMaterial, value: bool) -> None:
         gloss.add_gloss(self.id_data)
     else:
         gloss.remove_gloss(self.id_data)
+
+
+def _shadows_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
+    reflectance_models.refresh_shadows(self.id_data)
 
 
 class CdrfMaterial(bpy.types.PropertyGroup):
@@ -203,6 +208,27 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         """What was chosen; without a choice, whether the material has gloss to keep."""
         return gloss.suits(self.id_data) if self.chosen_gloss < 0 else bool(self.chosen_gloss)
 
+    shadows: EnumProperty(
+        name="Shadows",
+        description=(
+            "Whether other objects, and distant parts of this one, cast shadows on the surface. "
+            "Its own terminator stays soft. Shadows cost more than light does"
+        ),
+        items=SHADOW_ITEMS,
+        default=AUTO,
+        update=_shadows_changed,
+        options=set(),
+    )
+    shadow_edges: BoolProperty(
+        name="Coloured Edges",
+        description=(
+            "Soften the edges of shadows as far as each colour scatters. From Blender 5.1 on, for "
+            "occluders that the camera sees; needs some samples to be free of noise"
+        ),
+        default=True,
+        update=_shadows_changed,
+        options=set(),
+    )
     chosen_model: StringProperty(options={"HIDDEN"})
     measured: StringProperty(options={"HIDDEN"})
     # Blender deletes pictures that nobody uses; this one is wanted again.

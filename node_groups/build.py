@@ -19,7 +19,7 @@ sys.path.insert(0, str(HERE.parent))
 
 import bpy  # noqa: E402  (the checkout must be importable first)
 
-from cdrf_addon.blender import ambient_nodes, gloss, groups  # noqa: E402
+from cdrf_addon.blender import ambient_nodes, gloss, groups, shadows  # noqa: E402
 from cdrf_addon.blender.image import ensure_table  # noqa: E402
 from cdrf_addon.core.models import name_of, profile, ring, sphere  # noqa: E402
 
@@ -72,6 +72,7 @@ def build_all() -> list[bpy.types.ShaderNodeTree]:
     ]
     built += [ambient_nodes.harmonics_group(), groups.detail_group(), gloss.under_gloss_group()]
     built.append(groups.diffused_group())
+    built += [shadows.lit_group(translucent=translucent) for translucent in (False, True)]
     built += [groups.display_group(signed=signed) for signed in (False, True)]
     return built
 

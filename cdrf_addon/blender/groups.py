@@ -28,7 +28,7 @@ from ..core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS
 from .image import Table
 from .nodetree import TreeBuilder, declare, ensure_group
 
-VERSION = 6
+VERSION = 7
 
 ELLIPTIC = {"DISK", "ELLIPSE"}
 

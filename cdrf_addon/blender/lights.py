@@ -43,6 +43,8 @@ class SceneLight:
     """Type of the light, and shape of an area light: "SUN", "AREA ELLIPSE"."""
     soft: bool = True
     """Whether it is, or may become, so large that its size blurs the terminator visibly."""
+    casts: bool = True
+    """Whether it casts shadows, or may come to by animation."""
 
     @property
     def type(self) -> str:
@@ -65,10 +67,34 @@ def is_soft(item: bpy.types.Object) -> bool:
     return bool(light.shadow_soft_size > 0.0)
 
 
+def is_black(item: bpy.types.Object) -> bool:
+    """Tell whether a light sends nothing to diffuse surfaces, and no animation will change that.
+
+    Should somebody turn it up by hand, the panel offers Update.
+    """
+    light = item.data
+    if light.animation_data is not None or item.animation_data is not None:
+        return False
+    dark = light.energy == 0.0 or light.diffuse_factor == 0.0 or not item.visible_diffuse
+    return bool(dark or max(light.color) <= 0.0)
+
+
+def is_linked_to_some(item: bpy.types.Object) -> bool:
+    """Tell whether a light is limited to the objects of a collection (light linking)."""
+    linking = getattr(item, "light_linking", None)
+    return linking is not None and linking.receiver_collection is not None
+
+
+def casts_shadow(light: bpy.types.Light) -> bool:
+    """Tell whether a light casts shadows, or may come to by animation."""
+    return bool(light.use_shadow) or light.animation_data is not None
+
+
 def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> list[SceneLight]:
     """List the lights that a render of this view layer would use, by name.
 
-    A light that is switched off for renders is left out, unless its visibility is animated.
+    A light that is switched off for renders is left out, unless its visibility is animated, and
+    so is one that is black and cannot change by itself.
     """
     shown = _render_visible(view_layer.layer_collection)
     found = []
@@ -77,7 +103,10 @@ def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> lis
             continue
         if item.hide_render and not _animates(item, "hide_render"):
             continue
-        found.append(SceneLight(item, kind_of(item.data), is_soft(item)))
+        if is_black(item):
+            continue
+        light = item.data
+        found.append(SceneLight(item, kind_of(light), is_soft(item), casts_shadow(light)))
     return sorted(found, key=lambda light: light.object.name)
 
 

@@ -164,7 +164,18 @@ def install(material: bpy.types.Material, group: bpy.types.ShaderNodeTree) -> bp
         _swap(material.node_tree, node, group)
     if skin_output(material) is None:
         _add_output(material, node)
+    _link_thickness(material, node)
     return node
+
+
+def _link_thickness(material: bpy.types.Material, node: bpy.types.ShaderNode) -> None:
+    """Tell EEVEE how deep the surface's own shadow is skipped, unless the artist says otherwise."""
+    output = skin_output(material)
+    if output is None or ids.THICKNESS not in node.outputs:
+        return
+    socket = output.inputs.get("Thickness")
+    if socket is not None and not socket.is_linked:
+        material.node_tree.links.new(node.outputs[ids.THICKNESS], socket)
 
 
 def _add_alpha(builder: TreeBuilder, node: bpy.types.ShaderNode, alpha: Any) -> None:

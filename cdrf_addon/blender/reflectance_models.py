@@ -37,6 +37,7 @@ from .image import ensure_table, find_table, table_of
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
 from .read_material import Scattering
+from .shadows import Choice, choose
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -248,8 +249,9 @@ def change_variant(
     ratio: Sequence[float] | None = None,
     model: str | None = None,
     occluded: bool | None = None,
+    shadows: Choice | None = None,
 ) -> None:
-    """Swap a translucent material's shader group for one of another ratio, model or occlusion."""
+    """Swap a translucent material's shader group for another ratio, model, occlusion or shadows."""
     node = cdrf_node(material)
     if node is None:
         return
@@ -261,12 +263,30 @@ def change_variant(
         now.model if model is None else model,
         mapped=now.mapped,
         occluded=now.occluded if occluded is None else occluded,
+        shadows=now.shadows if shadows is None else shadows,
     )
     where = scene_of_group(node.node_tree)
     if wanted != now and where is not None:
         # The world's light as it was at the last Update: a slider must not render anything.
         light = world.stamped(node.node_tree)
         install(material, shader.ensure_shader_group(wanted, *where, light))
+
+
+def refresh_shadows(material: bpy.types.Material) -> None:
+    """Give a translucent material's group shadows, or take them out, as its setting says."""
+    node = cdrf_node(material)
+    if node is None or not material.is_editable:
+        return
+    layer = _view_layer(node.node_tree)
+    if layer is not None:
+        change_variant(material, shadows=choose(material, layer))
+
+
+def _view_layer(group: bpy.types.ShaderNodeTree) -> bpy.types.ViewLayer | None:
+    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
+    if scene is None or bpy.context.scene == scene:
+        return bpy.context.view_layer
+    return scene.view_layers[0]
 
 
 def scene_of_group(
@@ -276,6 +296,4 @@ def scene_of_group(
     scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
     if scene is None:
         return None
-    current = bpy.context.view_layer
-    layer = current if bpy.context.scene == scene else scene.view_layers[0]
-    return scene, scene_lights(scene, layer)
+    return scene, scene_lights(scene, _view_layer(group))

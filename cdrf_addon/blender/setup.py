@@ -36,8 +36,8 @@ from ..core.summary import (
     CurvatureSummary,
     summarise,
 )
-from . import display, gloss, reflectance_models, shader, state, world
-from .lights import SceneLight, scene_lights
+from . import display, gloss, reflectance_models, shader, shadows, state, world
+from .lights import SceneLight, is_linked_to_some, scene_lights
 from .materials import cdrf_node, install, is_mapped, require_editable
 from .mesh_io import (
     Shape,
@@ -446,6 +446,7 @@ class Setup:
             model,
             mapped=is_mapped(material),
             occluded=settings.ambient_occlusion,
+            shadows=shadows.choose(material, self.view_layer),
         )
         group = shader.ensure_shader_group(wanted, self.scene, lights, self.world)
         before = cdrf_node(material)
@@ -492,6 +493,13 @@ class Setup:
                     f"The lights inside the instance '{item.name}' do not reach the surface: "
                     "make them real (Object > Apply > Make Instances Real)."
                 )
+        limited = [light.object.name for light in lights if is_linked_to_some(light.object)]
+        if limited:
+            report.warnings.append(
+                f"The light '{limited[0]}' is linked to some objects only, which the translucent "
+                "surface does not heed: exclude the light's collection from this view layer, or "
+                "lower its power, if it should not shine here."
+            )
         if not lights and self.world is None:
             report.warnings.append("The scene has no light that renders, so the surface is black.")
         if self.scene.render.engine not in {EEVEE, "BLENDER_WORKBENCH"}:

@@ -8,7 +8,7 @@ each model of reflectance; the branches are one per light. Wiring:
                      -> x Sigma0 x Ratio -> squared = variance --------+
     normal (or map) -------+                                          |
     light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance/moment
-            -> Radiance ------------------------------> x f --> sum over i --> x Base Color
+            -> Radiance (x visibility: shadows.py) ---> x f --> sum over i --> x Base Color
     world (ambient_nodes.py) ------------------------------------> + ^
                                                                            x Strength -> Emission
 """
@@ -24,6 +24,7 @@ import bpy
 
 from .. import ids
 from ..core.models import RING, SPHERE, name_of
+from . import shadows
 from .ambient_nodes import (
     bands_group,
     feed_sun,
@@ -35,9 +36,11 @@ from .groups import SEPARATE, detail_group, diffused_group, light_group, reflect
 from .image import Table, find_table, table_of
 from .lights import HARD_SUN, SceneLight, drive_light
 from .nodetree import TreeBuilder, declare, is_intact, rebuild
+from .shadow_edge import edge_group
+from .shadows import NO_SHADOWS, Choice
 from .world import WorldLight, is_same, stamp, stamped
 
-VERSION = 6
+VERSION = 7
 
 # A channel narrower than a hundredth of the widest is Lambert in every row of the table.
 LEAST_MOMENT = 1e-4
@@ -65,6 +68,8 @@ class Variant:
     """Whether a normal or bump map feeds the Normal input."""
     occluded: bool = False
     """Whether what is near takes away from the world's light."""
+    shadows: Choice = NO_SHADOWS
+    """Whether the lights' cast shadows fall on the surface, and how."""
 
     @property
     def name(self) -> str:
@@ -72,6 +77,9 @@ class Variant:
         lookups = "+".join(self.channels.split())
         source = "" if self.source == ATTRIBUTE else f" {self.source}"
         extras = (" mapped" if self.mapped else "") + (" occluded" if self.occluded else "")
+        extras += (" shadows" if self.shadows.cast else "") + (
+            " coloured" if self.shadows.edges else ""
+        )
         return f"CDRF {name_of(self.model)} {lookups}{source}{extras}"
 
 
@@ -82,6 +90,7 @@ def variant_of(
     *,
     mapped: bool = False,
     occluded: bool = False,
+    shadows: Choice = NO_SHADOWS,
 ) -> Variant:
     """Choose the variant with one look-up per distinct sigma0.
 
@@ -89,7 +98,7 @@ def variant_of(
     each channel a normal of its own.
     """
     if source == FLAT and not mapped:
-        return Variant("RGB", FLAT, model, False, occluded)
+        return Variant("RGB", FLAT, model, False, occluded, shadows)
     red, green, blue = ratio
     if red == green == blue:
         channels = "RGB"
@@ -101,7 +110,7 @@ def variant_of(
         channels = "RB G"
     else:
         channels = "R G B"
-    return Variant(channels, source, model, mapped, occluded)
+    return Variant(channels, source, model, mapped, occluded, shadows)
 
 
 def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
@@ -115,6 +124,7 @@ def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
         group.get(ids.MODEL_KEY, RING),
         bool(group.get(ids.MAPPED_KEY, False)),
         bool(group.get(ids.OCCLUDED_KEY, False)),
+        Choice(bool(group.get(ids.SHADOW_KEY, False)), bool(group.get(ids.EDGE_KEY, False))),
     )
 
 
@@ -149,6 +159,8 @@ def ensure_shader_group(
         group[ids.MODEL_KEY] = variant.model
         group[ids.MAPPED_KEY] = variant.mapped
         group[ids.OCCLUDED_KEY] = variant.occluded
+        group[ids.SHADOW_KEY] = variant.shadows.cast
+        group[ids.EDGE_KEY] = variant.shadows.edges
         group[ids.SCENE_KEY] = scene.name
         group.color_tag = "SHADER"
         group.description = "Curvature-dependent translucency (Kubo et al. 2011), made by CDRF"
@@ -157,6 +169,7 @@ def ensure_shader_group(
     table = table_of(variant.model)
     rebuild(group, lambda builder: _build(builder, variant, lights, world, table))
     stamp(group, world)
+    group[ids.SHADOW_WORLD_KEY] = shadows.world_shines(scene.world)
     group[ids.VERSION_KEY] = VERSION
     return group
 
@@ -183,7 +196,23 @@ def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) ->
         # Where only the world shines nothing may have used it, and a saved file drops it.
         return not lights and not wired_lights(group)
     wanted = {(light.object, light.kind, branch_lookups(table, variant, light)) for light in lights}
-    return set(wired_lights(group)) == wanted
+    return set(wired_lights(group)) == wanted and not shadows_due(group, lights)
+
+
+def shadows_due(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -> str:
+    """Say how the shadows differ from those the group was made for; empty if they do not."""
+    if not stamped_variant(group).shadows.cast:
+        return ""
+    wired = {node.name for node in group.nodes if node.get(ids.SHADOW_KEY)}
+    targets = _targets(group)
+    casting = {targets.get(name) for name in wired}
+    changed = [light for light in lights if light.casts != (light.object in casting)]
+    if changed:
+        return f"light '{changed[0].object.name}' casts shadows now, or no more"
+    scene = bpy.data.scenes.get(group[ids.SCENE_KEY])
+    if wired and scene and shadows.world_shines(scene.world) != group.get(ids.SHADOW_WORLD_KEY):
+        return "the world's light was switched on or off"
+    return ""
 
 
 def wired_lights(
@@ -195,17 +224,23 @@ def wired_lights(
 
     The drivers' targets are asked, not names: they survive renaming.
     """
+    targets = _targets(group)
+    return [
+        (targets.get(node.name), node[ids.LIGHT_KEY], node.get(ids.LOOKUPS_KEY, ""))
+        for node in group.nodes
+        if ids.LIGHT_KEY in node
+    ]
+
+
+def _targets(group: bpy.types.ShaderNodeTree) -> dict[str, bpy.types.Object | None]:
+    """Map the names of the light nodes to the lights that drive them."""
     targets: dict[str, bpy.types.Object | None] = {}
     if group.animation_data is not None:
         for curve in group.animation_data.drivers:
             escaped = curve.data_path.removeprefix('nodes["').partition('"].inputs["')[0]
             target = curve.driver.variables[0].targets[0].id
             targets[bpy.utils.unescape_identifier(escaped)] = target
-    return [
-        (targets.get(node.name), node[ids.LIGHT_KEY], node.get(ids.LOOKUPS_KEY, ""))
-        for node in group.nodes
-        if ids.LIGHT_KEY in node
-    ]
+    return targets
 
 
 def _declare(tree: bpy.types.ShaderNodeTree) -> None:
@@ -289,19 +324,35 @@ def _build(
         normal = _normals(b, variant, table, given)
     if lights or (world is not None and has_bands(variant, world, table)):
         variance = _skin_variance(b, variant, given)
-    for light in lights:
-        node = b.group(light_group(light.kind), light.object.name)
-        node[ids.LIGHT_KEY] = light.kind
-        node[ids.LOOKUPS_KEY] = lookups = branch_lookups(table, variant, light)
-        drive_light(b.tree, node, light)
+    branches = [_light_node(b, variant, light, table) for light in lights]
+    visible = {}
+    if variant.shadows.cast and any(light.casts for light in lights):
+        visible = _visibilities(b, branches, lights)
+        declare(b.tree, ids.THICKNESS, output=True, tip="Where the surface's own shadow begins")
+        reach = shadows.thickness(b, given[ids.SIGMA0], given[ids.SIGMA0_RATIO])
+        b.feed(result[ids.THICKNESS], reach)
+    for number, node in enumerate(branches):
         lit = node.outputs
+        lookups = node[ids.LOOKUPS_KEY]
         f = b.group(
             reflectance_group(lookups, table, own_cosines=len(normal) > 1),
             f"Reflectance {node.name}",
             Cosine=_cosine(b, normal, lit[ids.DIRECTION]),
             Variance=_with_light(b, variance, lit[ids.VARIANCE], lookups, table),
         ).outputs[ids.REFLECTANCE]
-        total = b.vector("MULTIPLY_ADD", f, lit[ids.RADIANCE], total)
+        radiance = lit[ids.RADIANCE]
+        if number in visible and variant.shadows.edges and len(visible) <= shadows.MOST_ISOLATED:
+            edge = b.group(
+                edge_group(),
+                f"Shadow Edge {node.name}",
+                Visibility=visible[number],
+                Direction=lit[ids.DIRECTION],
+                Width=b.vector("SCALE", given[ids.SIGMA0_RATIO], scale=given[ids.SIGMA0]),
+            )
+            radiance = b.vector("MULTIPLY", radiance, edge.outputs[ids.VISIBILITY])
+        elif number in visible:
+            radiance = b.vector("SCALE", radiance, scale=visible[number])
+        total = b.vector("MULTIPLY_ADD", f, radiance, total)
     if world is not None:
         total = _with_world(b, variant, world, table, normal, variance, total)
     emission = b.node("ShaderNodeEmission")
@@ -351,6 +402,34 @@ def _with_world(
     if strength is None:
         return b.vector("ADD", light, total)
     return b.vector("MULTIPLY_ADD", light, strength, total)
+
+
+def _light_node(
+    b: TreeBuilder, variant: Variant, light: SceneLight, table: Table
+) -> bpy.types.ShaderNode:
+    """Add the node of a light, driven by it and stamped with what it was wired for."""
+    node = b.group(light_group(light.kind), light.object.name)
+    node[ids.LIGHT_KEY] = light.kind
+    node[ids.LOOKUPS_KEY] = branch_lookups(table, variant, light)
+    node[ids.SHADOW_KEY] = variant.shadows.cast and light.casts
+    drive_light(b.tree, node, light)
+    return node
+
+
+def _visibilities(
+    b: TreeBuilder,
+    nodes: Sequence[bpy.types.ShaderNode],
+    lights: Sequence[SceneLight],
+) -> dict[int, Any]:
+    """Visibility of each light that casts shadows, by its number; for the surface's own normal."""
+    normal = b.node("ShaderNodeNewGeometry").outputs["Normal"]
+    scene = bpy.data.scenes.get(b.tree[ids.SCENE_KEY])
+    shines = shadows.world_shines(scene.world if scene is not None else None)
+    branches = [
+        shadows.Branch(node.outputs[ids.DIRECTION], node.outputs[ids.RADIANCE], light.casts)
+        for node, light in zip(nodes, lights, strict=True)
+    ]
+    return shadows.Shadows(b, branches, normal, world=shines).visibilities()
 
 
 def _with_light(b: TreeBuilder, skin: Any, light: Any, lookups: str, table: Table) -> Any:

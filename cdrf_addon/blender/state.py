@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from .. import ids
-from . import gloss, shader, world
+from . import gloss, shader, shadows, world
 from .image import Table, find_table
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, skin_output
@@ -82,6 +82,8 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
     if not parts:
         resized = [light.object.name for light in lights if _other_lookups(group, table, light)]
         parts = [f"light '{name}' got another size" for name in resized]
+    if not parts:
+        parts = [part for part in (shader.shadows_due(group, lights),) if part]
     return "; ".join(parts) or "the node group is incomplete or of an older version"
 
 
@@ -121,12 +123,18 @@ def reasons_to_update(
             done = "taken off" if variant.mapped else "connected to"
             reasons.append(f"A normal map was {done} the CDRF node.")
         ratio = tuple(node.inputs[ids.SIGMA0_RATIO].default_value)
+        shadowed = shadows.choose(slot.material, view_layer).cast
+        if shadowed and not variant.shadows.cast:
+            reasons.append("Shadows: an object that can cast one is new.")
+        elif variant.shadows.cast and not shadowed:
+            reasons.append("Shadows: nothing casts one any more.")
         wanted = shader.variant_of(
             ratio,
             variant.source,
             variant.model,
             mapped=variant.mapped,
             occluded=variant.occluded,
+            shadows=variant.shadows,
         )
         if wanted != variant:
             reasons.append("The colour ratio was changed in the node.")

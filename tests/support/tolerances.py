@@ -38,3 +38,13 @@ WORLD_CYCLES = Bound(
     0.012,
     "a square window is shaded as a disc; path tracing with 128 samples has 1 to 2 % of noise",
 )
+SHADOW = Bound(
+    8e-3,
+    2e-3,
+    "clear of edges, in a peak of 1/2: EEVEE's horizon table leaves 0.8 % of a light in the plane "
+    "where another is measured; bleeding beyond 5 sigma0 is cut",
+)
+SHADOW_OF_MANY = Bound(0.3, 1e-2, "one mask for all lights darkens those that are not blocked")
+SHADOW_WORLD = Bound(
+    2e-2, 1e-2, "EEVEE's world light is not quite the even function that is taken off"
+)

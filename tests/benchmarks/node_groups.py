@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the node group holds and costs, by lights and shadows: writes docs/node_groups.md.
+
+    ./dev python tests/benchmarks/node_groups.py         ten minutes on two cores; Blender 5.2
+
+Viewport draws, interleaved: in each round every contender is drawn in turn, so that a drift of the
+machine meets all alike. Ratios are to the Diffuse BSDF with the same lights.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
+
+import bpy  # noqa: E402  (the checkout must be importable first)
+import numpy as np  # noqa: E402
+from machine import machine  # noqa: E402
+from rig import Rig, cdrf_node, diffuse_material  # noqa: E402
+
+from cdrf_addon import ids, register, unregister  # noqa: E402
+from cdrf_addon.blender import shader  # noqa: E402
+from cdrf_addon.compat import ensure_node_tree  # noqa: E402
+
+PIXELS = 384
+GREY, SKIN = (1.0, 1.0, 1.0), (1.0, 0.35, 0.2)
+COUNTS = (1, 2, 4, 8, 16)
+SHADOWED = (1, 2, 3, 4)
+
+
+@dataclass
+class Contender:
+    """A material under some of the lights."""
+
+    name: str
+    material: bpy.types.Material
+    lights: int
+    shadows: bool = False
+    nodes: int = 0
+    """Nodes in all, those of nested groups counted each time they are used."""
+    own: int = 0
+    """Nodes in the group itself."""
+    lookups: int = 0
+    first: float = 0.0
+    times: list[float] = field(default_factory=list)
+
+
+def count(tree: bpy.types.ShaderNodeTree) -> int:
+    """Nodes of a tree, with those of its groups."""
+    return sum(
+        count(node.node_tree) if node.type == "GROUP" else 1
+        for node in tree.nodes
+        if node.type not in {"GROUP_INPUT", "GROUP_OUTPUT"}
+    )
+
+
+class Stage:
+    """One sphere, sixteen suns, and the contenders."""
+
+    def __init__(self) -> None:
+        self.rig = Rig()
+        self.item = self.rig.sphere(subdivisions=6)
+        self.item.scale = (1.0, 1.0, 1.001)  # not quite a sphere: the shader reads the attribute
+        self.suns = [
+            self.rig.light(
+                "SUN",
+                name=f"Sun {i}",
+                energy=math.pi / (1 + i),
+                angle=0.0,
+                rotation=(0.5 + 0.11 * i, 0.0, 1.7 * i),
+            )
+            for i in range(max(COUNTS))
+        ]
+
+    def light(self, lights: int, *, shadows: bool) -> None:
+        """Switch on the first few suns."""
+        for number, sun in enumerate(self.suns):
+            sun.hide_render = sun.hide_viewport = number >= lights
+            sun.data.use_shadow = shadows
+
+    def show(self, contender: Contender) -> None:
+        """Make the scene a contender's."""
+        self.light(contender.lights, shadows=contender.shadows)
+        self.item.data.materials.clear()
+        self.item.data.materials.append(contender.material)
+        bpy.context.view_layer.update()
+
+    def skin(
+        self, lights: int, ratio: Sequence[float], *, shadows: bool = False, edges: bool = False
+    ) -> Contender:
+        """Make a material with a shader group of its own for these lights."""
+        material = bpy.data.materials.new("Skin")
+        kind = "coloured shadows" if edges else "shadows" if shadows else "no shadows"
+        name = f"CDRF, {1 if ratio == GREY else 3} look-ups, {kind}"
+        contender = Contender(name, material, lights, shadows)
+        self.show(contender)
+        material.cdrf.shadows = "ON" if shadows else "OFF"
+        material.cdrf.shadow_edges = edges
+        assert bpy.ops.cdrf.setup() == {"FINISHED"}
+        material.cdrf.sigma0 = 0.2
+        material.cdrf.sigma0_ratio = ratio
+        node = cdrf_node(self.item)
+        node.node_tree = tree = node.node_tree.copy()
+        tree[ids.SCENE_KEY] = f"benchmark {name} {lights}"  # the next set-up leaves it alone
+        node.inputs[ids.SIGMA0].default_value = 0.2
+        node.inputs[ids.SIGMA0_RATIO].default_value = ratio
+        output = tree_output(material)
+        material.node_tree.links.new(node.outputs[ids.SHADER], output.inputs["Surface"])
+        if ids.THICKNESS in node.outputs and shadows:
+            material.node_tree.links.new(node.outputs[ids.THICKNESS], output.inputs[ids.THICKNESS])
+        contender.nodes, contender.own = count(tree), len(tree.nodes)
+        contender.lookups = sum(len(look.split()) for *_, look in shader.wired_lights(tree))
+        return contender
+
+
+def tree_output(material: bpy.types.Material) -> bpy.types.ShaderNode:
+    """The output that EEVEE uses."""
+    return material.node_tree.get_output_node("EEVEE")
+
+
+def contenders(stage: Stage) -> list[Contender]:
+    """All that is compared; the Diffuse BSDF under each number of lights comes first."""
+    diffuse = diffuse_material()
+    glow = bpy.data.materials.new("Emission")
+    tree = ensure_node_tree(glow)
+    tree.nodes.clear()
+    emission = tree.nodes.new("ShaderNodeEmission")
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
+    scatter = bpy.data.materials.new("Subsurface")
+    principled = next(
+        node for node in ensure_node_tree(scatter).nodes if node.type == "BSDF_PRINCIPLED"
+    )
+    principled.inputs["Subsurface Weight"].default_value = 1.0
+    found = [Contender("Emission", glow, 1)]
+    found += [Contender("Diffuse", diffuse, n) for n in COUNTS]
+    found += [Contender("Diffuse", diffuse, n, True) for n in SHADOWED]
+    found.append(Contender("Principled, subsurface", scatter, 1))
+    found += [stage.skin(n, ratio) for n in COUNTS for ratio in (GREY, SKIN)]
+    found += [stage.skin(n, SKIN, shadows=True) for n in SHADOWED]
+    found += [stage.skin(n, SKIN, shadows=True, edges=True) for n in (1, 3)]
+    return found
+
+
+def drawer(rig: Rig) -> Callable[[], float]:
+    """Return a function that draws once into a viewport and tells the seconds."""
+    import gpu  # late: only Blender 5.2 can draw without a window
+
+    gpu.init()
+    rig.scene.eevee.taa_samples = 1
+    area = next(a for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
+    space = area.spaces.active
+    space.shading.type = "RENDERED"
+    space.overlay.show_overlays = False
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    target = gpu.types.GPUOffScreen(PIXELS, PIXELS, format="RGBA16F")
+    view = rig.camera.matrix_world.inverted()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    lens = rig.camera.calc_matrix_camera(depsgraph, x=PIXELS, y=PIXELS)
+    turns = itertools.count()
+
+    def draw() -> float:
+        # A view that stands still is not drawn again, so each is a hair beside the last.
+        view.translation.x = 1e-5 * next(turns)
+        start = time.perf_counter()
+        target.draw_view3d(
+            rig.scene, bpy.context.view_layer, space, region, view, lens, do_color_management=False
+        )
+        with target.bind():  # reading a pixel waits for the drawing to end
+            gpu.state.active_framebuffer_get().read_color(0, 0, 1, 1, 4, 0, "FLOAT")
+        return time.perf_counter() - start
+
+    return draw
+
+
+def measure(rounds: int) -> None:
+    """Draw all contenders in turn, several times, and write the page after each round."""
+    stage = Stage()
+    found = contenders(stage)
+    draw = drawer(stage.rig)
+    for contender in found:
+        stage.show(contender)
+        contender.first = draw()
+        print(contender.name, contender.lights, f"first draw {contender.first:.1f} s", flush=True)
+    for turn in range(rounds):
+        for contender in found:
+            stage.show(contender)
+            draw()
+            contender.times.append(draw())
+        print(f"round {turn + 1} of {rounds}", flush=True)
+        # Kept after each round, as a busy machine may not come to the last.
+        (ROOT / "docs" / "node_groups.md").write_text(page(found))
+
+
+def row(contender: Contender, base: Contender) -> list[str]:
+    """One line of the table: medians, and the spread of the ratio over the draws."""
+    ratios = np.array(contender.times) / np.array(base.times)
+    low, middle, high = np.percentile(ratios, (10, 50, 90))
+    own = f"{contender.own} / {contender.nodes}" if contender.own else ""
+    return [
+        str(contender.lights),
+        contender.name if not contender.shadows or "CDRF" in contender.name else "Diffuse, shadows",
+        own,
+        str(contender.lookups or ""),
+        f"{1e3 * float(np.median(contender.times)):.0f}",
+        f"{middle:.2f} ({low:.2f} to {high:.2f})",
+        f"{contender.first - base.first:+.1f}",
+    ]
+
+
+HEAD = """# What the node group holds and costs
+
+Generated by `tests/benchmarks/node_groups.py`; do not edit.
+
+The group in a material holds one branch per light that shines, as many table look-ups in it as
+there are different σ₀, and nodes for shadows only where shadows are on and the light casts one.
+Nodes are given as *in the group itself / in all*, those of nested groups counted each time they are
+used. A draw is one sample of {pixels} × {pixels} pixels in the viewport; ratios are to the Diffuse
+BSDF with the same lights, draw by draw (median, 10 % to 90 %); the last column is what the first
+draw, with compilation, takes longer than that of the Diffuse BSDF.
+
+Measured on: {facts}; EEVEE on a software rasteriser, other jobs beside it.
+"""
+TABLE = ["lights", "material", "nodes", "look-ups", "ms", "ratio to Diffuse", "first draw, s more"]
+
+
+def page(found: Sequence[Contender]) -> str:
+    """Write the page."""
+    bases = {(c.lights, c.shadows): c for c in found if c.name == "Diffuse"}
+
+    def table(rows: Sequence[Contender]) -> list[str]:
+        lines = ["| " + " | ".join(TABLE) + " |", "|" + "---|" * len(TABLE)]
+        for contender in rows:
+            cells = row(contender, bases[contender.lights, contender.shadows])
+            lines.append("| " + " | ".join(cells) + " |")
+        return [*lines, ""]
+
+    def pick(lights: int, words: str) -> Contender:
+        return next(c for c in found if c.lights == lights and words in c.name)
+
+    facts = ", ".join(f"{name} {value}" for name, value in machine().items())
+    lines = [HEAD.format(pixels=PIXELS, facts=facts)]
+    lines += ["## Three examples", "", "(a) one sun, grey σ₀; (b) three lights, RGB σ₀, shadows "]
+    lines += ["without and with coloured edges.", ""]
+    examples = [pick(1, "1 look-ups"), pick(3, "look-ups, shadows"), pick(3, "coloured")]
+    lines += table(examples)
+    plain = [c for c in found if not c.shadows]
+    lines += ["## By number of lights, without shadows", ""]
+    lines += table(sorted(plain, key=lambda c: c.lights))
+    lines += ["## With shadows", ""]
+    lines += table(sorted((c for c in found if c.shadows), key=lambda c: c.lights))
+    glow, skin, scatter = pick(1, "Emission"), pick(1, "3 look-ups, no"), pick(1, "Principled")
+    above = [float(np.median(np.array(c.times) - np.array(glow.times))) for c in (skin, scatter)]
+    lines += [
+        f"Above plain Emission, a CDRF light with three look-ups costs {1e3 * above[0]:.0f} ms and "
+        f"EEVEE's subsurface scattering {1e3 * above[1]:.0f} ms.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure and write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5)
+    rounds = parser.parse_args().rounds
+    register()
+    try:
+        measure(rounds)
+    finally:
+        unregister()
+
+
+if __name__ == "__main__":
+    main()

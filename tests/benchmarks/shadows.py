@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cast shadows against Cycles, fingers held over a sphere and a head: writes docs/shadows.md.
+
+    ./dev python tests/benchmarks/shadows.py [--pictures FOLDER]       about ten minutes
+
+Reference: Cycles, Random Walk, no light between surfaces. Scatter distances are
+those that Make Translucent reads from the same node; nothing is fitted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
+
+import bpy  # noqa: E402  (the checkout must be importable first)
+import numpy as np  # noqa: E402
+from machine import machine  # noqa: E402
+from mathutils import Vector  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
+from rig import Rig  # noqa: E402
+
+from cdrf_addon import register, unregister  # noqa: E402
+from cdrf_addon.compat import EEVEE, ensure_node_tree  # noqa: E402
+
+Array = NDArray[np.float64]
+PIXELS = 128
+SAMPLES = 24
+CYCLES_SAMPLES = 128
+ALBEDO = 0.9
+RADII = (1.0, 0.35, 0.2)
+SCALES = (0.03, 0.1)
+SUN = (0.75, -0.6, 0.45)
+SECOND = (-0.7, -0.35, 0.25)
+"""Directions towards the sun, and towards a second one where there are two."""
+
+
+@dataclass
+class Scene:
+    """A shape under fingers, ready to be rendered."""
+
+    rig: Rig
+    item: bpy.types.Object
+    suns: list[bpy.types.Object]
+    scatter: bpy.types.ShaderNode
+
+
+def fingers(rig: Rig, towards: Vector) -> None:
+    """Four cylinders side by side between the light and the shape; a hole in the picture."""
+    side = towards.cross(Vector((0.0, 0.0, 1.0))).normalized()
+    along = side.cross(towards).normalized()
+    for number in range(4):
+        place = 1.25 * towards + (0.24 * number - 0.36) * along + 0.45 * side
+        bpy.ops.mesh.primitive_cylinder_add(radius=0.075, depth=0.9, location=place)
+        finger = bpy.context.object
+        finger.rotation_euler = side.to_track_quat("Z", "Y").to_euler()
+        finger.is_holdout = True
+
+
+def make(shape: str, directions: Sequence[Sequence[float]]) -> Scene:
+    """Build the scene of a shape, two units large."""
+    rig = Rig(2.3)
+    rig.scene.render.resolution_x = rig.scene.render.resolution_y = PIXELS
+    suns = []
+    for number, direction in enumerate(directions):
+        turn = Vector(direction).to_track_quat("Z", "Y").to_euler()
+        energy = math.pi / (number + 1)
+        suns.append(rig.light("SUN", energy=energy, angle=0.02, use_shadow=True, rotation=turn))
+    bpy.context.view_layer.update()
+    fingers(rig, Vector(directions[0]).normalized())
+    if shape == "sphere":
+        item = rig.sphere()
+    else:
+        bpy.ops.wm.obj_import(filepath=str(ROOT / "tests" / "data" / "human_head.obj"))
+        item = bpy.context.object
+        item.modifiers.new("Subdivision", "SUBSURF").levels = 2
+        item.modifiers[0].render_levels = 2
+        bpy.ops.object.convert(target="MESH")
+        bpy.ops.object.shade_smooth()
+        size = max(item.dimensions)
+        item.scale = [2.1 / size] * 3
+        bpy.ops.object.transform_apply(location=False, rotation=True, scale=True)
+        bpy.ops.object.origin_set(type="ORIGIN_GEOMETRY", center="BOUNDS")
+        item.location = (0.0, 0.0, 0.0)
+    item.data.materials.clear()
+    material = bpy.data.materials.new("Wax")
+    item.data.materials.append(material)
+    tree = ensure_node_tree(material)
+    tree.nodes.clear()
+    scatter = tree.nodes.new("ShaderNodeSubsurfaceScattering")
+    scatter.falloff = "RANDOM_WALK"
+    scatter.inputs["Color"].default_value = (ALBEDO,) * 3 + (1.0,)
+    scatter.inputs["Radius"].default_value = RADII
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(scatter.outputs["BSSRDF"], output.inputs["Surface"])
+    bpy.ops.object.select_all(action="DESELECT")
+    item.select_set(True)
+    bpy.context.view_layer.objects.active = item
+    return Scene(rig, item, suns, scatter)
+
+
+def reference(scene: Scene) -> Array:
+    """Path-trace the scene."""
+    settings = scene.rig.scene
+    settings.render.engine = "CYCLES"
+    cycles = settings.cycles
+    cycles.device, cycles.samples, cycles.seed = "CPU", CYCLES_SAMPLES, 1
+    cycles.use_adaptive_sampling = False
+    cycles.use_denoising, cycles.denoiser = True, "OPENIMAGEDENOISE"
+    cycles.max_bounces = 0
+    cycles.pixel_filter_type, cycles.filter_width = "BOX", 0.01
+    return scene.rig.render()
+
+
+def ours(scene: Scene, shadows: str, edges: bool) -> Array:
+    """Render with the CDRF, with or without shadows."""
+    settings = scene.rig.scene
+    settings.render.engine = EEVEE
+    settings.eevee.taa_render_samples = SAMPLES
+    settings.render.filter_size = 1.5  # without a film filter every sample meets the same noise
+    material = scene.item.data.materials[0]
+    material.cdrf.shadow_edges = edges
+    material.cdrf.shadows = shadows
+    bpy.context.view_layer.update()
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    return scene.rig.render()
+
+
+def error(picture: Array, wanted: Array, covered: NDArray[np.bool_]) -> float:
+    """RMS over pixels, mean over R, G and B."""
+    off = (picture - wanted)[covered][:, :3]
+    return float(np.sqrt((off**2).mean(axis=0)).mean())
+
+
+def save(pictures: Sequence[Array], path: Path) -> None:
+    """Write pictures side by side, lightened for the eye."""
+    row = np.concatenate([picture[..., :3] for picture in pictures], axis=1)
+    row = np.kron(np.clip(row, 0.0, 1.0) ** (1.0 / 2.2), np.ones((2, 2, 1)))
+    image = bpy.data.images.new("Row", row.shape[1], row.shape[0])
+    image.pixels.foreach_set(np.dstack((row, np.ones(row.shape[:2]))).astype(np.float32).ravel())
+    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.save()
+
+
+def measure(folder: Path | None, cases: Sequence[str]) -> list[list[str]]:
+    """Measure every case."""
+    rows = []
+    for case in cases:
+        shape, lights = case.split()
+        directions = (SUN,) if lights == "1" else (SUN, SECOND)
+        for scale in SCALES:
+            scene = make(shape, directions)
+            scene.scatter.inputs["Scale"].default_value = scale
+            wanted = reference(scene)
+            choices = (("OFF", False), ("ON", False), ("ON", True))
+            pictures = [ours(scene, shadows, edges) for shadows, edges in choices]
+            covered = (wanted[..., 3] > 0.999) & (pictures[0][..., 3] > 0.999)
+            errors = [error(picture, wanted, covered) for picture in pictures]
+            rows.append([shape, lights, f"{scale:g}", *(f"{value:.4f}" for value in errors)])
+            print(*rows[-1], flush=True)
+            if folder is not None:
+                save((wanted, *pictures), folder / f"{shape}_{lights}_{scale:g}.png")
+    return rows
+
+
+HEAD = f"""# Cast shadows against path tracing
+
+Generated by `tests/benchmarks/shadows.py`; do not edit.
+
+RMSE against Cycles (Random Walk, albedo {ALBEDO}, radius (1, 0.35, 0.2) · scale, no light between
+surfaces) over the visible skin, mean of R, G and B, in units of a white surface facing the sun. The
+shapes are two units large; four cylinders are held in the sun's way like the fingers of a hand. The
+scatter distances are those the first press of the button reads from the node; nothing is fitted. A
+second sun of half the strength comes from the other side.
+"""
+
+
+def main() -> None:
+    """Measure, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--pictures", type=Path, help="folder for Cycles | without | with | with colour"
+    )
+    parser.add_argument("--cases", nargs="+", default=["sphere 1", "head 1", "head 2"])
+    parser.add_argument("--dry", action="store_true", help="do not write the page")
+    chosen = parser.parse_args()
+    register()
+    try:
+        rows = measure(chosen.pictures, chosen.cases)
+    finally:
+        unregister()
+    if chosen.dry:
+        return
+    facts = ", ".join(f"{name} {value}" for name, value in machine().items())
+    lines = [HEAD, f"Measured on: {facts}.", ""]
+    lines += [
+        "| shape | lights | scale | without shadows | with shadows |",
+        "|---|---|---|---|---|",
+    ]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    (ROOT / "docs" / "shadows.md").write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cast shadows: where a ray to the light is blocked by another object, and nowhere else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+from numpy.typing import NDArray
+from rig import RESOLUTION, Rig, cdrf_node
+from tolerances import SHADOW, SHADOW_OF_MANY, SHADOW_WORLD
+
+from cdrf_addon import ids
+from cdrf_addon.blender import state
+from cdrf_addon.compat import HAS_RAYCAST
+from cdrf_addon.core.heat_kernel import sphere_reflectance
+
+SIGMA = 0.2
+SCALE = 2.3
+# The key faces the camera from the right, the second comes from the left, and so on.
+SUNS = ((0.6, -0.7, 0.35), (-0.75, -0.5, 0.2), (0.1, -0.45, -0.85), (-0.2, -0.6, 0.75))
+EDGE = 0.06
+"""Pixels this near to a shadow's edge are not compared: EEVEE's shadow maps have texels."""
+
+Array = NDArray[np.float64]
+
+
+def directions(count: int) -> Array:
+    found = np.array(SUNS[:count])
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def scene_of(rig: Rig, count: int) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """A unit sphere under suns of one half, one third ... and a bar in the way of the first."""
+    rig.camera.data.ortho_scale = SCALE
+    for number, direction in enumerate(directions(count)):
+        turn = Vector(direction).to_track_quat("Z", "Y").to_euler()
+        sun = rig.light("SUN", energy=math.pi / (number + 2), angle=0.0, rotation=turn)
+        sun.data.use_shadow = True
+    toward = Vector(directions(1)[0])
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=1.35 * toward)
+    bar = bpy.context.object
+    bar.scale = (0.3, 1.6, 0.2)
+    bar.rotation_euler = toward.to_track_quat("Z", "Y").to_euler()
+    # What the camera sees of it must not hide the sphere.
+    bar.visible_camera = False
+    ball = rig.sphere(subdivisions=6)
+    bpy.context.view_layer.update()
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    material = ball.data.materials[0]
+    material.cdrf.shadow_edges = False
+    material.cdrf.sigma0 = SIGMA
+    cdrf_node(ball).inputs["Base Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    return ball, bar
+
+
+def points() -> tuple[Array, NDArray[np.bool_]]:
+    """Where on the unit sphere the pixels lie, (height, width, 3), and which are on it."""
+    steps = ((np.arange(RESOLUTION) + 0.5) / RESOLUTION - 0.5) * SCALE
+    x, z = np.meshgrid(steps, steps)
+    inside = x**2 + z**2 < 0.97**2
+    y = -np.sqrt(np.maximum(1.0 - x**2 - z**2, 0.0))
+    return np.stack((x, y, z), axis=-1), inside
+
+
+def blocked(bar: bpy.types.Object, places: Array, direction: Array) -> NDArray[np.bool_]:
+    mesh = bar.data.copy()
+    mesh.transform(bar.matrix_world)
+    tree = BVHTree.FromPolygons(
+        [v.co for v in mesh.vertices], [tuple(p.vertices) for p in mesh.polygons]
+    )
+    toward = Vector(direction)
+    return np.array([tree.ray_cast(Vector(place), toward)[0] is not None for place in places])
+
+
+def expected(bar: bpy.types.Object, count: int) -> tuple[Array, NDArray[np.bool_]]:
+    """What theory shows, and the pixels clear of every edge."""
+    places, clear = points()
+    flat = places.reshape(-1, 3)
+    shown = np.zeros(len(flat))
+    for number, direction in enumerate(directions(count)):
+        cosine = flat @ direction
+        light = sphere_reflectance(np.arccos(np.clip(cosine, -1.0, 1.0)), SIGMA) / (number + 2)
+        side = np.cross(direction, (0.0, 0.0, 1.0))
+        side /= np.linalg.norm(side)
+        up = np.cross(side, direction)
+        shadow = blocked(bar, flat, direction)
+        for step in (side, -side, up, -up):
+            same = blocked(bar, flat + EDGE * step, direction) == shadow
+            clear &= same.reshape(clear.shape)
+        shown += np.where(shadow, 0.0, light)
+    return shown.reshape(clear.shape), clear
+
+
+def errors(rig: Rig, bar: bpy.types.Object, count: int) -> Array:
+    wanted, clear = expected(bar, count)
+    picture = rig.render()[..., 0]
+    off = np.abs(picture - wanted)[clear]
+    print(f"{count} lights: worst {off.max():.2e}, RMS {np.sqrt((off**2).mean()):.2e}")
+    return off
+
+
+@pytest.mark.smoke
+def test_one_light_is_blocked_by_others_and_not_by_the_surface_itself(rig: Rig) -> None:
+    _, bar = scene_of(rig, 1)
+    off = errors(rig, bar, 1)
+    assert off.max() <= SHADOW.worst
+    assert np.sqrt((off**2).mean()) <= SHADOW.rms
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_two_and_three_lights_have_their_own_shadows(rig: Rig, count: int) -> None:
+    _, bar = scene_of(rig, count)
+    off = errors(rig, bar, count)
+    assert off.max() <= SHADOW.worst
+    assert np.sqrt((off**2).mean()) <= SHADOW.rms
+
+
+def test_four_lights_share_a_mask(rig: Rig) -> None:
+    _, bar = scene_of(rig, 4)
+    off = errors(rig, bar, 4)
+    assert np.sqrt((off**2).mean()) <= SHADOW_OF_MANY.rms
+
+
+def test_the_world_does_not_brighten_a_shadow(rig: Rig) -> None:
+    background = rig.scene.world.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    background.inputs["Strength"].default_value = 0.2
+    _, bar = scene_of(rig, 1)
+    off = errors(rig, bar, 1)
+    assert np.sqrt((off**2).mean()) <= SHADOW_WORLD.rms
+
+
+def shadow_nodes(ball: bpy.types.Object) -> int:
+    tree = cdrf_node(ball).node_tree
+    return sum(node.name.startswith("Shadow") for node in tree.nodes)
+
+
+def reasons(ball: bpy.types.Object) -> str:
+    context = bpy.context
+    return " ".join(state.reasons_to_update(ball, context.scene, context.view_layer))
+
+
+@pytest.mark.smoke
+def test_auto_needs_an_occluder_and_a_light_that_casts(rig: Rig) -> None:
+    sun = rig.light("SUN", use_shadow=True)
+    ball = rig.sphere()
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    assert shadow_nodes(ball) == 0
+    assert reasons(ball) == ""
+
+    rig.link(bpy.data.meshes.new("Hat"))
+    bpy.context.view_layer.update()
+    assert "can cast one" in reasons(ball)
+    bpy.ops.cdrf.update()
+    assert shadow_nodes(ball) > 0
+    assert ids.THICKNESS in cdrf_node(ball).outputs
+    assert cdrf_node(ball).outputs[ids.THICKNESS].is_linked
+    assert reasons(ball) == ""
+
+    sun.data.use_shadow = False
+    assert "casts shadows now, or no more" in reasons(ball)
+    bpy.ops.cdrf.update()
+    assert shadow_nodes(ball) == 0
+    assert reasons(ball) == ""
+
+
+def test_the_setting_changes_the_group_at_once(rig: Rig) -> None:
+    rig.light("SUN", use_shadow=True)
+    ball = rig.sphere()
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    material = ball.data.materials[0]
+    material.cdrf.shadows = "ON"
+    assert (shadow_nodes(ball) > 1) == HAS_RAYCAST  # the light's mask, and its edge
+    material.cdrf.shadow_edges = False
+    assert shadow_nodes(ball) == 1
+    material.cdrf.sigma0_ratio = (1.0, 0.5, 0.2)
+    assert shadow_nodes(ball) == 1
+    material.cdrf.shadows = "OFF"
+    assert shadow_nodes(ball) == 0
+
+
+def test_world_switched_on_is_noticed(rig: Rig) -> None:
+    rig.light("SUN", use_shadow=True)
+    ball = rig.sphere()
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    ball.data.materials[0].cdrf.shadows = "ON"
+    assert reasons(ball) == ""
+    rig.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 1.0
+    assert "world" in reasons(ball)
+    bpy.ops.cdrf.update()
+    assert reasons(ball) == ""
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_black_light_costs_nothing_and_is_noticed_when_turned_up(rig: Rig, count: int) -> None:
+    lights: Sequence[bpy.types.Object] = [
+        rig.light("POINT", energy=0.0 if i else 10.0) for i in range(count)
+    ]
+    ball = rig.sphere()
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    tree = cdrf_node(ball).node_tree
+    assert sum(ids.LIGHT_KEY in node for node in tree.nodes) == 1
+    if count > 1:
+        lights[1].data.energy = 5.0
+        assert "is new" in reasons(ball)
