@@ -248,7 +248,7 @@ def page(found: Sequence[Contender]) -> str:
 
     facts = ", ".join(f"{name} {value}" for name, value in machine().items())
     lines = [HEAD.format(pixels=PIXELS, facts=facts)]
-    lines += ["## Three examples", "", "(a) one sun, grey σ₀; (b) three lights, RGB σ₀, shadows "]
+    lines += ["## Examples", "", "(a) one sun, grey σ₀; (b) three lights, RGB σ₀, shadows"]
     lines += ["without and with coloured edges.", ""]
     examples = [pick(1, "1 look-ups"), pick(3, "look-ups, shadows"), pick(3, "coloured")]
     lines += table(examples)

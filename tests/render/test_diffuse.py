@@ -79,7 +79,6 @@ CASES: dict[str, dict[str, Any]] = {
         "scale": (2.0, 1.0, 1.0),
         "rotation": TILTED,
     },
-    "negative point": {"kind": "POINT", "energy": -300.0},
     "spot of 180 degrees": {"kind": "SPOT", "energy": 300.0, "spot_size": np.pi},
     "spot of a mirrored lamp": {
         "kind": "SPOT",
