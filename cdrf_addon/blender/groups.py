@@ -21,14 +21,14 @@ import bpy
 from .. import ids
 from ..core.colour_scale import HOT, MARK_COLOUR, SIGNED
 from ..core.detail import PHASE
-from ..core.finite_light import VARIANCE_COEFFICIENTS
+from ..core.finite_light import SPHERE_GAIN, VARIANCE_COEFFICIENTS
 from ..core.lut import DEFAULT_LAYOUT, VARIANCE_MAX
 from ..core.models import name_of
 from ..core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS
 from .image import Table
 from .nodetree import TreeBuilder, declare, ensure_group
 
-VERSION = 7
+VERSION = 8
 
 ELLIPTIC = {"DISK", "ELLIPSE"}
 
@@ -170,6 +170,7 @@ def diffused_group() -> bpy.types.ShaderNodeTree:
 
 def _declare_light(tree: bpy.types.ShaderNodeTree) -> None:
     declare(tree, ids.POWER, "Vector", tip="Light's power times Blender's constant for its type")
+    declare(tree, ids.GAIN, default=SPHERE_GAIN, tip="Of the model: ring 1/2, sphere 1")
     for name in (ids.DIRECTION, ids.RADIANCE):
         declare(tree, name, "Vector", output=True)
     declare(tree, ids.VARIANCE, output=True)
@@ -182,13 +183,13 @@ def _declare_local(tree: bpy.types.ShaderNodeTree) -> None:
     )
 
 
-def _finite(b: TreeBuilder, sin2: Any) -> tuple[Any, Any]:
+def _finite(b: TreeBuilder, sin2: Any, exponent: Any) -> tuple[Any, Any]:
     """Return variance and gain of a light of that squared sine (core/finite_light.py)."""
     c0, c1, c2 = VARIANCE_COEFFICIENTS
     inner = b.math("MULTIPLY_ADD", sin2, c2, c1)
     inner = b.math("MULTIPLY_ADD", sin2, inner, c0)
     variance = b.math("MULTIPLY", sin2, inner)
-    return variance, b.math("EXPONENT", b.math("MULTIPLY", variance, 0.5))
+    return variance, b.math("EXPONENT", b.math("MULTIPLY", variance, exponent))
 
 
 def _towards(b: TreeBuilder, position: Any) -> tuple[Any, Any]:
@@ -213,7 +214,7 @@ def sun_group() -> bpy.types.ShaderNodeTree:
         declare(b.tree, ids.AXIS_Z, "Vector", tip="Towards the sun, any length")
         declare(b.tree, ids.SIN2_HALF_ANGLE, low=0.0, high=1.0)
         given, result = _ends(b)
-        variance, gain = _finite(b, given[ids.SIN2_HALF_ANGLE])
+        variance, gain = _finite(b, given[ids.SIN2_HALF_ANGLE], given[ids.GAIN])
         b.feed(result[ids.DIRECTION], b.vector("NORMALIZE", given[ids.AXIS_Z]))
         b.feed(result[ids.RADIANCE], b.vector("SCALE", given[ids.POWER], scale=gain))
         b.feed(result[ids.VARIANCE], variance)
@@ -235,7 +236,7 @@ def point_group() -> bpy.types.ShaderNodeTree:
         softened = b.math("MULTIPLY_ADD", radius2, given[ids.SOFT_FALLOFF], distance2)
         floor = b.math("MAXIMUM", SOFT_RADIUS2, radius2)
         falloff = b.math("DIVIDE", 1.0, b.math("MAXIMUM", softened, floor))
-        variance, gain = _finite(b, b.math("MULTIPLY", radius2, falloff))
+        variance, gain = _finite(b, b.math("MULTIPLY", radius2, falloff), given[ids.GAIN])
         amount = b.math("MULTIPLY", falloff, gain)
         amount = b.math("MULTIPLY", amount, _window(b, distance2, given[ids.INVERSE_RANGE2]))
         b.feed(result[ids.DIRECTION], b.vector("NORMALIZE", to_light))
@@ -266,6 +267,7 @@ def spot_group() -> bpy.types.ShaderNodeTree:
             point_group(),
             "Point",
             Power=given[ids.POWER],
+            Gain_Exponent=given[ids.GAIN],
             Position=given[ids.POSITION],
             Inverse_Squared_Range=given[ids.INVERSE_RANGE2],
             Radius=given[ids.RADIUS],
@@ -355,7 +357,7 @@ def area_group(*, elliptic: bool) -> bpy.types.ShaderNodeTree:
         product = b.vector("LENGTH", b.vector("CROSS_PRODUCT", right, up))
         drawn = b.math("GREATER_THAN", product, LEAST_HALF_AXES_PRODUCT)
         world_area = b.math("MULTIPLY", product, axes_to_area)
-        variance, gain = _finite(b, b.math("MULTIPLY", magnitude, 1.0 / math.pi))
+        variance, gain = _finite(b, b.math("MULTIPLY", magnitude, 1.0 / math.pi), given[ids.GAIN])
         # Per square metre without Normalize, in all with it: area^-normalize.
         density = b.math("POWER", world_area, b.math("MULTIPLY", given[ids.NORMALIZE], -1.0))
         amount = b.math("MULTIPLY", b.math("MULTIPLY", magnitude, density), gain)

@@ -13,7 +13,7 @@ from ..core.errors import SceneError
 from ..core.lut import DEFAULT_LAYOUT, build_lut
 from ..core.models import RING, SPHERE, Model, name_of, ring, sphere
 
-LUT_VERSION = 4
+LUT_VERSION = 5
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Table:
     """Model.colour."""
     moments: tuple[float, float, float]
     """Model.moments."""
+    gain: float
+    """Model.gain."""
 
 
 def find_table(key: str) -> Table | None:
@@ -39,7 +41,9 @@ def find_table(key: str) -> Table | None:
             and image.get(ids.MODEL_KEY) == key
         ):
             red, green, blue = image[ids.MOMENTS_KEY]
-            return Table(image, key, bool(image[ids.COLOUR_KEY]), (red, green, blue))
+            return Table(
+                image, key, bool(image[ids.COLOUR_KEY]), (red, green, blue), image[ids.GAIN_KEY]
+            )
     return None
 
 
@@ -87,4 +91,5 @@ def ensure_table(model: Model) -> Table:
     image[ids.MODEL_KEY] = model.key
     image[ids.COLOUR_KEY] = model.colour
     image[ids.MOMENTS_KEY] = model.moments
-    return Table(image, model.key, model.colour, model.moments)
+    image[ids.GAIN_KEY] = model.gain
+    return Table(image, model.key, model.colour, model.moments, model.gain)

@@ -40,7 +40,7 @@ from .shadow_edge import edge_group
 from .shadows import NO_SHADOWS, Choice
 from .world import WorldLight, is_same, stamp, stamped
 
-VERSION = 7
+VERSION = 8
 
 # A channel narrower than a hundredth of the widest is Lambert in every row of the table.
 LEAST_MOMENT = 1e-4
@@ -386,6 +386,7 @@ def _with_world(
         sun = SceneLight(None, "SUN", environment.sun.sin2_half_angle > SMALL_SUN)
         lookups = branch_lookups(table, variant, sun)
         node = b.group(light_group("SUN"), "World Sun")
+        node.inputs[ids.GAIN].default_value = table.gain
         feed_sun(node, environment.sun)
         f = b.group(
             reflectance_group(lookups, table, own_cosines=len(normal) > 1),
@@ -412,6 +413,7 @@ def _light_node(
     node[ids.LIGHT_KEY] = light.kind
     node[ids.LOOKUPS_KEY] = branch_lookups(table, variant, light)
     node[ids.SHADOW_KEY] = variant.shadows.cast and light.casts
+    node.inputs[ids.GAIN].default_value = table.gain
     drive_light(b.tree, node, light)
     return node
 

@@ -24,6 +24,7 @@ import numpy as np
 from .arguments import checked
 from .energy import conserving
 from .errors import ParameterError
+from .finite_light import RING_GAIN, SPHERE_GAIN
 from .heat_kernel import sphere_reflectance
 from .reflectance import reflectance
 
@@ -79,6 +80,8 @@ class Model:
     """True where red, green and blue differ at the same sigma."""
     moments: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """Variance of each channel's blur over sigma^2: what the blur of a large light adds to."""
+    gain: float = SPHERE_GAIN
+    """Part of a large light's variance in the exponent of its gain (core/finite_light.py)."""
 
 
 def name_of(key: str) -> str:
@@ -89,7 +92,7 @@ def name_of(key: str) -> str:
 
 def ring() -> Model:
     """The paper's model (Kubo et al. 2011, Eqs. 3 and 4)."""
-    return Model(RING, RING, reflectance)
+    return Model(RING, RING, reflectance, gain=RING_GAIN)
 
 
 def sphere() -> Model:
@@ -212,7 +215,8 @@ def profile(shape: Profile = SKIN_PROFILE) -> Model:
     moments = (rms / reference) ** 2 if reference > 0.0 else np.ones(3)
     key = f"{PROFILE} {_hash(shape.base, shape.to_text())}"
     red, green, blue = (float(moment) for moment in moments)
-    return Model(PROFILE, key, evaluate, True, (red, green, blue))
+    gain = RING_GAIN if shape.base == RING else SPHERE_GAIN
+    return Model(PROFILE, key, evaluate, True, (red, green, blue), gain)
 
 
 def measured_model(

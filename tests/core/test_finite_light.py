@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from cdrf_addon.core.finite_light import finite_light
+from cdrf_addon.core.finite_light import RING_GAIN, SPHERE_GAIN, finite_light
+from cdrf_addon.core.heat_kernel import sphere_reflectance
 from cdrf_addon.core.reflectance import reflectance
 
 pytestmark = pytest.mark.smoke
@@ -95,11 +96,16 @@ def test_the_quadrature_is_sound(half_angle: float) -> None:
     )
 
 
+@pytest.mark.parametrize("along", ["ring", "sphere"])
 @pytest.mark.parametrize(("half_angle", "worst"), WORST)
-def test_the_blur_stands_for_the_light(half_angle: float, worst: float) -> None:
+def test_the_blur_stands_for_the_light(half_angle: float, worst: float, along: str) -> None:
     theta = np.linspace(0.0, math.pi, 1441)
-    variance, gain = finite_light(math.sin(half_angle) ** 2)
-    blurred = reflectance(theta, math.sqrt(float(variance))) * gain
+    model = {"ring": reflectance, "sphere": sphere_reflectance}[along]
+    variance, gain = finite_light(
+        math.sin(half_angle) ** 2, {"ring": RING_GAIN, "sphere": SPHERE_GAIN}[along]
+    )
+    blurred = model(theta, math.sqrt(float(variance))) * gain
+    worst *= 1.4 if along == "sphere" else 1.0  # the coefficients are the ring's
     error = np.abs(blurred - irradiance(theta, half_angle))
     assert error.max() <= worst, f"worst at {math.degrees(theta[error.argmax()]):.1f} degrees"
     # High above the horizon the gain undoes the blur: there the light is a point.

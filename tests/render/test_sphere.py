@@ -12,7 +12,7 @@ import pytest
 from rig import Rig, cdrf_node
 from tolerances import FOUR_LIGHTS, SHADER, WRITTEN, Bound
 
-from cdrf_addon.core.finite_light import finite_light
+from cdrf_addon.core.finite_light import SPHERE_GAIN, finite_light
 from cdrf_addon.core.heat_kernel import sphere_reflectance
 from cdrf_addon.core.models import PROFILE, RING, SPHERE, profile, ring, sphere
 
@@ -97,7 +97,7 @@ def test_a_large_light_blurs_each_channel_of_a_profile_alike(rig: Rig) -> None:
     material.cdrf.sigma0 = 1e-4
     normals, covered = rig.normals(ball)
     theta = np.arccos(np.clip(normals[covered] @ towards(sun), -1.0, 1.0))
-    variance, gain = finite_light(math.sin(math.radians(20.0)) ** 2)
+    variance, gain = finite_light(math.sin(math.radians(20.0)) ** 2, SPHERE_GAIN)
     value, _ = rig.render_exact(ball, "Shader", -0.01, 1.2)
     expected = gain * sphere_reflectance(theta, math.sqrt(variance))
     for channel, bound in enumerate((0.03, 0.03, 0.03)):
