@@ -223,9 +223,9 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         name="Coloured Edges",
         description=(
             "Soften the edges of shadows as far as each colour scatters. From Blender 5.1 on, for "
-            "occluders that the camera sees; needs some samples to be free of noise"
+            "occluders that the camera sees; costs several times a shadow, and some samples"
         ),
-        default=True,
+        default=False,
         update=_shadows_changed,
         options=set(),
     )
