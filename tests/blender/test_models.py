@@ -313,3 +313,45 @@ def test_tables_are_made_once_per_file(rig: Rig) -> None:
     assert parse_profile(SKIN_PROFILE.to_text()).rms_widths == pytest.approx(
         SKIN_PROFILE.rms_widths, rel=1e-6
     )
+
+
+def test_what_others_wire_is_read_as_blender_reads_it(rig: Rig) -> None:
+    material, principled = scattering_material()
+    tree = material.node_tree
+    value = tree.nodes.new("ShaderNodeValue")
+    value.outputs[0].default_value = 0.5
+    tree.links.new(value.outputs[0], principled.inputs["Subsurface Radius"])
+    colour = tree.nodes.new("ShaderNodeRGB")
+    colour.outputs[0].default_value = (0.2, 0.2, 0.2, 1.0)
+    tree.links.new(colour.outputs[0], principled.inputs["Subsurface Scale"])
+    found = read_scattering(material)
+    assert found is not None
+    assert found.radius == pytest.approx((0.1, 0.1, 0.1), rel=1e-3)
+
+
+def test_shaders_inside_groups_and_mixes_are_found_where_they_show(rig: Rig) -> None:
+    inner = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
+    inner.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    scatter = inner.nodes.new("ShaderNodeSubsurfaceScattering")
+    scatter.inputs["Scale"].default_value = 0.1
+    ending = inner.nodes.new("NodeGroupOutput")
+    inner.links.new(scatter.outputs[0], ending.inputs[0])
+    material, principled = scattering_material()
+    tree = material.node_tree
+    group = tree.nodes.new("ShaderNodeGroup")
+    group.node_tree = inner
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
+    tree.links.new(principled.outputs["BSDF"], mix.inputs[1])
+    tree.links.new(group.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    for factor, scale in ((0.0, 0.05), (1.0, 0.1)):
+        mix.inputs[0].default_value = factor
+        found = read_scattering(material)
+        assert found is not None and max(found.radius) == pytest.approx(scale)
+    mix.inputs[0].default_value = 0.0
+    principled.mute = True
+    assert read_scattering(material) is None
+    principled.mute = False
+    principled.inputs["Metallic"].default_value = 1.0
+    assert read_scattering(material) is None
