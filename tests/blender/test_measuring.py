@@ -33,10 +33,7 @@ asked: list[Request] = []
 def spheres(request: Request) -> SphereMeasurement:
     theta = np.arccos(COSINE)
     values = [
-        [
-            sphere_reflectance(np.arccos(COSINE), 0.6 * np.tanh(slope * scale / 0.6))
-            for slope in SLOPES
-        ]
+        [sphere_reflectance(theta, 0.6 * np.tanh(slope * scale / 0.6)) for slope in SLOPES]
         for scale in SCALES
     ]
     errors = np.full((len(SCALES), 3, len(COSINE)), 1e-4)
