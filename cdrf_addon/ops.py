@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Generator
 from pathlib import Path
+from typing import Any
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
@@ -25,23 +24,19 @@ from .core.curvature import Options
 from .core.errors import CdrfError
 from .core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
 from .core.mesh import NO_CREASE
-from .core.progress import in_words
+from .modal import StepByStep
 
 # Meshes up to this size are done in under half a second; above it a progress bar comes up.
 MODAL_FROM_VERTICES = 15_000
-TICK_SECONDS = 0.05
 
 
-class _Job(bpy.types.Operator):
+class _Job(StepByStep):
     """Runs a Setup at once from a script, or step by step behind a progress bar for a person.
 
     Never registered itself; it has no bl_idname.
     """
 
     _job: Setup
-    _steps: Generator[tuple[float, str], None, None]
-    _timer: bpy.types.Timer
-    _start: float
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -55,60 +50,22 @@ class _Job(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            job = self.make_job(context)
-            for _ in job.steps():
+            self._job = self.make_job(context)
+            for _ in self._job.steps():
                 pass
         except CdrfError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return self._finish(job)
+            return self.refuse(error)
+        return self.finish_or_say(context, None)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         try:
             self._job = self.make_job(context)
         except CdrfError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return self.refuse(error)
         if self._evaluated_vertices(context) < MODAL_FROM_VERTICES:
             return self.execute(context)
         self._steps = self._job.steps()
-        self._start = time.monotonic()
-        manager = context.window_manager
-        manager.progress_begin(0.0, 1.0)
-        self._timer = manager.event_timer_add(TICK_SECONDS, window=context.window)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC":
-            self._leave_modal(context)
-            self.report({"WARNING"}, "Stopped; nothing was changed.")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        try:
-            part, what = next(self._steps)
-        except StopIteration:
-            self._leave_modal(context)
-            return self._finish(self._job)
-        except CdrfError as error:
-            self._leave_modal(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        context.window_manager.progress_update(part)
-        far = in_words(part, time.monotonic() - self._start)
-        context.workspace.status_text_set(f"CDRF: {what}, {far}   (Esc stops)")
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        self._leave_modal(context)
-
-    def _leave_modal(self, context: bpy.types.Context) -> None:
-        self._steps.close()
-        manager = context.window_manager
-        manager.event_timer_remove(self._timer)
-        manager.progress_end()
-        context.workspace.status_text_set(None)
+        return self.begin(context)
 
     def _evaluated_vertices(self, context: bpy.types.Context) -> int:
         depsgraph = context.evaluated_depsgraph_get()
@@ -116,9 +73,8 @@ class _Job(bpy.types.Operator):
             len(work.users[0].evaluated_get(depsgraph).data.vertices) for work in self._job.work
         )
 
-    def _finish(self, job: Setup) -> set[str]:
-        report = job.commit()
-        _tell(self, report)
+    def finish(self, _context: bpy.types.Context, _result: Any) -> set[str]:
+        _tell(self, self._job.commit())
         return {"FINISHED"}
 
 

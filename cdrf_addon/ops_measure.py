@@ -21,7 +21,7 @@ from . import ids
 from .blender import reflectance_models
 from .blender.fit_picture import make_picture, picture_path, show_picture
 from .blender.image import ensure_table
-from .blender.materials import active_skin, cdrf_node
+from .blender.materials import cdrf_node
 from .blender.read_material import Scattering, read_scattering
 from .compat import walk_method
 from .core.errors import CdrfError, ParameterError, SceneError
@@ -29,7 +29,7 @@ from .core.material_fit import MaterialFit, fit_material, sigma0_at
 from .core.measured import MeasuredModel
 from .core.measurement import SphereMeasurement
 from .core.models import RING, SPHERE, measured_model
-from .core.progress import in_words, run_steps
+from .core.progress import run_steps
 from .core.scattering import BURLEY, sigma0_per_radius
 from .core.summary import CONSTANT
 from .measure import (
@@ -40,10 +40,10 @@ from .measure import (
     cache_folder,
     measure_steps,
 )
-from .ops_model import warn_if_overridden
+from .modal import StepByStep
+from .ops_model import OnSkin, skin_of, warn_if_overridden
 
 Colour = tuple[float, float, float]
-TICK_SECONDS = 0.1
 # Cycles has no albedo of 0 to measure.
 LEAST_ALBEDO = 1e-3
 # Principal curvatures of a sphere are equal; an open cylinder's are not.
@@ -58,12 +58,11 @@ QUALITY_ITEMS = (
 )
 
 
-class _PathTraced(bpy.types.Operator):
+class _PathTraced(OnSkin, StepByStep):
     """Measures the active material behind a progress bar; never registered itself."""
 
-    _steps: Generator[tuple[float, str], None, Any]
-    _timer: bpy.types.Timer
-    _start: float
+    # The path tracing is elsewhere: the artist goes on working.
+    WHILE_WAITING = "PASS_THROUGH"
     _skin: int
     _kappa: float
     _round: bool
@@ -77,6 +76,7 @@ class _PathTraced(bpy.types.Operator):
         default=(0.8, 0.8, 0.8),
         min=0.0,
         max=1.0,
+        options={"SKIP_SAVE"},
     )
     radius: FloatVectorProperty(
         name="Scatter Radius R, G, B",
@@ -89,6 +89,7 @@ class _PathTraced(bpy.types.Operator):
         default=(0.01, 0.01, 0.01),
         min=0.0,
         precision=4,
+        options={"SKIP_SAVE"},
     )
     quality: EnumProperty(
         name="Quality",
@@ -106,20 +107,8 @@ class _PathTraced(bpy.types.Operator):
 
     method: StringProperty(default=RANDOM_WALK, options={"HIDDEN", "SKIP_SAVE"})
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        skin = active_skin(context.object)
-        if skin is None:
-            cls.poll_message_set("Make the object translucent first")
-            return False
-        if not skin.is_editable:
-            cls.poll_message_set("The material is linked from another file: make it local first")
-            return False
-        return True
-
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        skin = active_skin(context.object)
-        assert skin is not None
+        skin = skin_of(context)
         self._fill_in(skin)
         return context.window_manager.invoke_props_dialog(self, width=360)
 
@@ -137,8 +126,7 @@ class _PathTraced(bpy.types.Operator):
             layout.prop(self, name)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        skin = active_skin(context.object)
-        assert skin is not None
+        skin = skin_of(context)
         self._fill_in(skin)
         self._skin = skin.session_uid
         known = context.object.data.cdrf
@@ -148,52 +136,10 @@ class _PathTraced(bpy.types.Operator):
         try:
             self._steps = self._work(self._request())
             if context.window is None or bpy.app.background:
-                return self._finish(context, run_steps(self._steps))
+                return self.finish(context, run_steps(self._steps))
         except CdrfError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self._start = time.monotonic()
-        manager = context.window_manager
-        manager.progress_begin(0.0, 1.0)
-        self._timer = manager.event_timer_add(TICK_SECONDS, window=context.window)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC":
-            self._leave_modal(context)
-            self.report({"WARNING"}, "Stopped; nothing was changed.")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            # The path tracing is elsewhere: the artist goes on working.
-            return {"PASS_THROUGH"}
-        try:
-            part, what = next(self._steps)
-        except StopIteration as end:
-            self._leave_modal(context)
-            try:
-                return self._finish(context, end.value)
-            except CdrfError as error:
-                self.report({"ERROR"}, str(error))
-                return {"CANCELLED"}
-        except CdrfError as error:
-            self._leave_modal(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        context.window_manager.progress_update(part)
-        far = in_words(part, time.monotonic() - self._start)
-        context.workspace.status_text_set(f"CDRF: {what}, {far}   (Esc stops)")
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        self._leave_modal(context)
-
-    def _leave_modal(self, context: bpy.types.Context) -> None:
-        self._steps.close()
-        manager = context.window_manager
-        manager.event_timer_remove(self._timer)
-        manager.progress_end()
-        context.workspace.status_text_set(None)
+            return self.refuse(error)
+        return self.begin(context)
 
     def _request(self) -> Request:
         if not 0.0 < max(self.radius) <= MOST_RADIUS:
@@ -215,10 +161,6 @@ class _PathTraced(bpy.types.Operator):
 
     def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
         """Path-trace, then work out what this operator is after."""
-        raise NotImplementedError
-
-    def _finish(self, context: bpy.types.Context, found: Any) -> set[str]:
-        """Write the result to the material."""
         raise NotImplementedError
 
 
@@ -293,7 +235,7 @@ class CDRF_OT_measure(_PathTraced):
         make = partial(measured_model, found, tuple(self.radius), keep_energy=kept)
         return (yield from _aside(make, 1.0, "Smoothing"))
 
-    def _finish(self, context: bpy.types.Context, found: Any) -> set[str]:
+    def finish(self, context: bpy.types.Context, found: Any) -> set[str]:
         skin = self._material()
         model, sigma0 = found
         table = ensure_table(model)
@@ -318,7 +260,7 @@ class CDRF_OT_fit(_PathTraced):
         work = partial(_smooth_and_fit, spheres, tuple(self.radius))
         return (yield from _aside(work, 1.0, "Fitting"))
 
-    def _finish(self, context: bpy.types.Context, found: Any) -> set[str]:
+    def finish(self, context: bpy.types.Context, found: Any) -> set[str]:
         skin = self._material()
         model, fitted = found
         if reflectance_models.has_colour(skin):

@@ -18,7 +18,7 @@ from .core.presets import PRESETS
 OPAQUE, MOLTEN = 0.02, 1.5
 
 
-class _OnSkin(bpy.types.Operator):
+class OnSkin(bpy.types.Operator):
     """An operator on the active translucent material; never registered itself."""
 
     @classmethod
@@ -33,9 +33,10 @@ class _OnSkin(bpy.types.Operator):
         return True
 
 
-def _skin(context: bpy.types.Context) -> bpy.types.Material:
+def skin_of(context: bpy.types.Context) -> bpy.types.Material:
+    """Return the material that `OnSkin.poll` found."""
     skin = active_skin(context.object)
-    assert skin is not None  # poll saw to that
+    assert skin is not None
     return skin
 
 
@@ -46,7 +47,7 @@ def warn_if_overridden(operator: bpy.types.Operator, skin: bpy.types.Material) -
         operator.report({"WARNING"}, what)
 
 
-class CDRF_OT_set_model(_OnSkin):
+class CDRF_OT_set_model(OnSkin):
     """Choose how the light that spreads under the surface shades it"""
 
     bl_idname = "cdrf.set_model"
@@ -56,7 +57,7 @@ class CDRF_OT_set_model(_OnSkin):
     model: EnumProperty(name="Model", items=MODEL_ITEMS, default=DEFAULT_KIND)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        skin = _skin(context)
+        skin = skin_of(context)
         try:
             reflectance_models.set_kind(skin, self.model)
         except CdrfError as error:
@@ -66,7 +67,7 @@ class CDRF_OT_set_model(_OnSkin):
         return {"FINISHED"}
 
 
-class CDRF_OT_preset(_OnSkin):
+class CDRF_OT_preset(OnSkin):
     """Scatter distance of a real material, in millimetres, for each colour"""
 
     bl_idname = "cdrf.preset"
@@ -95,7 +96,7 @@ class CDRF_OT_preset(_OnSkin):
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        skin = _skin(context)
+        skin = skin_of(context)
         preset = PRESETS[self.preset]
         size = 1.0
         if self.real_height > 0.0:
@@ -127,7 +128,7 @@ class CDRF_OT_preset(_OnSkin):
             self.report({"WARNING"}, f"At {tall} tall light passes right through: {advice}")
 
 
-class CDRF_OT_read_shader(_OnSkin):
+class CDRF_OT_read_shader(OnSkin):
     """Take the scatter distance from the material's own Principled or Subsurface Scattering node"""
 
     bl_idname = "cdrf.read_shader"
@@ -135,7 +136,7 @@ class CDRF_OT_read_shader(_OnSkin):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        skin = _skin(context)
+        skin = skin_of(context)
         found = read_scattering(skin)
         if found is None:
             self.report(
