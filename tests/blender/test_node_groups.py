@@ -43,7 +43,7 @@ def test_groups_are_reused_and_older_ones_rebuilt_in_place(rig: Rig) -> None:
     first[ids.VERSION_KEY] = groups.VERSION - 1
     assert groups.sun_group() == first
     assert len(first.nodes) == count
-    assert len(first.interface.items_tree) == 6
+    assert len(first.interface.items_tree) == 7
 
 
 def test_a_foreign_group_of_the_same_name_is_left_alone(rig: Rig) -> None:
