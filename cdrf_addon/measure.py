@@ -29,7 +29,7 @@ from .core.errors import MeasurementError
 from .core.measurement import SphereMeasurement, bin_pixels, load, pool, save
 from .core.progress import run_steps
 
-VERSION = 2
+VERSION = 3
 """Part of the cache's key: raise it when the worker measures something else."""
 WORKER = Path(__file__).resolve().with_name("measure_worker.py")
 PROGRESS = "CDRF-PROGRESS"
@@ -106,6 +106,10 @@ class Request:
         first = FIRST_SCALE * (OLD_REACH if old else 1.0)
         rows = tuple(first * 2.0 ** (row / ROWS_PER_OCTAVE) for row in range(ROWS))
         return replace(self, scales=rows)
+
+    def samples(self) -> int:
+        """Paths through a pixel in a pass: more where the albedo is low and paths are short."""
+        return round(QUALITIES[self.quality].samples * (2.0 - sum(self.albedo) / 3.0) ** 1.5)
 
     def orders(self) -> dict[str, Any]:
         """Pixels, directions of the light and passes from each."""
@@ -213,7 +217,7 @@ def write_order(request: Request, folder: Path) -> Path:
     """Write the worker's order, and return its path."""
     names = ("albedo", "scales", "radius", "seed", "method")
     order = {name: getattr(request, name) for name in names} | request.orders()
-    order["samples"] = QUALITIES[request.quality].samples
+    order["samples"] = request.samples()
     order["answer"] = str(folder / "answer.npz")
     path = folder / "order.json"
     path.write_text(json.dumps(order), encoding="utf-8")
@@ -304,7 +308,7 @@ def _read(request: Request, path: Path) -> SphereMeasurement:
         np.array(request.albedo),
         np.array(request.scales),
         *pooled,
-        samples=quality.samples * quality.passes,
+        samples=request.samples() * quality.passes,
         seed=request.seed,
         blender=str(raw["blender"]),
         method=request.method,

@@ -177,6 +177,8 @@ def test_the_setting_changes_the_group_at_once(rig: Rig) -> None:
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
     material = ball.data.materials[0]
     material.cdrf.shadows = "ON"
+    assert shadow_nodes(ball) == 1
+    material.cdrf.shadow_edges = True
     assert (shadow_nodes(ball) > 1) == HAS_RAYCAST  # the light's mask, and its edge
     material.cdrf.shadow_edges = False
     assert shadow_nodes(ball) == 1
