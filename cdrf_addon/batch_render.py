@@ -15,7 +15,6 @@ import atexit
 import hashlib
 import json
 import math
-import os
 import subprocess
 import sys
 import tempfile
@@ -35,6 +34,7 @@ import bpy
 from cdrf_addon import compat, register, unregister
 from cdrf_addon.blender import display, legend, reflectance_models, setup, stage
 from cdrf_addon.blender.materials import cdrf_node
+from cdrf_addon.command_line import leave, own_arguments, say
 from cdrf_addon.core.curvature import Options
 from cdrf_addon.core.errors import CdrfError, ParameterError, SceneError
 from cdrf_addon.core.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
@@ -204,13 +204,6 @@ def make_parser() -> argparse.ArgumentParser:
     add("--demo", action="store_true", help="the human head, Lambert beside CDRF")
     add("--worker", action="store_true", help=argparse.SUPPRESS)
     return parser
-
-
-def own_arguments(argv: list[str]) -> list[str]:
-    """Drop Blender's arguments where the script runs inside it."""
-    if bpy.app.binary_path and "--" in argv:
-        return argv[argv.index("--") + 1 :]
-    return [] if bpy.app.binary_path else argv[1:]
 
 
 def apply_demo(options: argparse.Namespace, parser: argparse.ArgumentParser) -> None:
@@ -515,11 +508,6 @@ def _entry(target: Path, key: str, seconds: float, *, resumed: bool) -> dict[str
 # --- many scenes ------------------------------------------------------------------------------
 
 
-def say(text: str) -> None:
-    """Print at once, also into a pipe."""
-    print(text, flush=True)
-
-
 def unique_stems(paths: list[Path]) -> list[str]:
     """Name the pictures of each input: its stem, numbered where two inputs share one."""
     stems: list[str] = []
@@ -681,14 +669,5 @@ def _run(options: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
-def _leave(code: int) -> None:
-    """End the process; Blender 4.5 as a module now and then hangs in its libraries' destructors."""
-    if bpy.app.binary_path:
-        sys.exit(code)
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
-
-
 if __name__ == "__main__":
-    _leave(main())
+    leave(main())

@@ -14,11 +14,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +30,7 @@ import numpy as np
 from cdrf_addon.blender.fit_figure import draw_fit
 from cdrf_addon.blender.read_material import read_scattering
 from cdrf_addon.blender.reflectance_models import metres_of
+from cdrf_addon.command_line import leave, own_arguments, say
 from cdrf_addon.core.errors import CdrfError, MeasurementError
 from cdrf_addon.core.fitting import MODELS
 from cdrf_addon.core.material_fit import CHANNELS, EQUATOR, WEIGHTINGS, MaterialFit, fit_material
@@ -119,18 +118,6 @@ def make_parser() -> argparse.ArgumentParser:
     add("--output", type=Path, default=Path("fit"), help="folder for the results (default: fit)")
     add("--no-cache", action="store_true", help="measure anew, and keep nothing but the results")
     return parser
-
-
-def own_arguments(argv: Sequence[str]) -> list[str]:
-    """Drop Blender's arguments where the script runs inside it."""
-    if bpy.app.binary_path:
-        return list(argv[list(argv).index("--") + 1 :]) if "--" in argv else []
-    return list(argv[1:])
-
-
-def say(text: str) -> None:
-    """Print at once, also into a pipe."""
-    print(text, flush=True)
 
 
 def run_measurement(request: Request, folder: Path) -> SphereMeasurement:
@@ -314,14 +301,5 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def _leave(code: int) -> None:
-    """End the process; Blender 4.5 as a module now and then hangs in its libraries' destructors."""
-    if bpy.app.binary_path:
-        sys.exit(code)
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
-
-
 if __name__ == "__main__":
-    _leave(main())
+    leave(main())

@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any
 
 import bpy
+import numpy as np
 from bpy.props import EnumProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from . import ids
@@ -183,7 +184,10 @@ def own_scattering(skin: bpy.types.Material) -> Scattering:
 def _smooth_and_fit(
     spheres: SphereMeasurement, radius: Colour
 ) -> tuple[MeasuredModel, MaterialFit]:
-    return MeasuredModel(spheres, radius), fit_material(spheres)
+    fitted = fit_material(spheres)
+    # The slope that the model would otherwise fit once more.
+    widest = fitted.channels[int(np.argmax(radius))]
+    return MeasuredModel(spheres, radius, widest.sigma0["sphere"]), fitted
 
 
 def _aside(
@@ -286,14 +290,4 @@ class CDRF_OT_fit(_PathTraced):
 
 CLASSES = (CDRF_OT_measure, CDRF_OT_fit)
 
-
-def register() -> None:
-    """Register the operators."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Undo `register`."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

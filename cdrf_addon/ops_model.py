@@ -157,14 +157,4 @@ class CDRF_OT_read_shader(OnSkin):
 
 CLASSES = (CDRF_OT_set_model, CDRF_OT_preset, CDRF_OT_read_shader)
 
-
-def register() -> None:
-    """Register the operators."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Undo `register`."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -238,14 +238,4 @@ class CDRF_PT_material(bpy.types.Panel):
 
 CLASSES = (CDRF_PT_main, CDRF_PT_material)
 
-
-def register() -> None:
-    """Register the panels."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Undo `register`."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

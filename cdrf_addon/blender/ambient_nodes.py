@@ -19,7 +19,7 @@ from .. import ids
 from ..core.ambient import BAND_ROWS, Sun, bands_of_table, shader_coefficients
 from ..core.lut import DEFAULT_LAYOUT, VARIANCE_MAX
 from ..core.models import SPHERE, name_of
-from .image import Table
+from .image import Table, packed_image
 from .lights import drive
 from .nodetree import TreeBuilder, declare, ensure_group
 from .world import WorldLight
@@ -27,10 +27,6 @@ from .world import WorldLight
 VERSION = 1
 COLUMNS = 3
 """Columns of a table of band factors, one for each channel."""
-
-
-def _ends(b: TreeBuilder) -> tuple[Any, Any]:
-    return b.node("NodeGroupInput").outputs, b.node("NodeGroupOutput").inputs
 
 
 def bands_group(channels: str, table: Table) -> bpy.types.ShaderNodeTree:
@@ -46,7 +42,7 @@ def bands_group(channels: str, table: Table) -> bpy.types.ShaderNodeTree:
         declare(b.tree, ids.VARIANCE, "Vector", tip="Squared blur width of each channel")
         for name in ids.BANDS:
             declare(b.tree, name, "Vector", output=True)
-        given, result = _ends(b)
+        given, result = b.ends()
         variance = dict(zip("RGB", b.separate(given[ids.VARIANCE]), strict=True))
         if table.key == SPHERE:
             _closed_form(b, sets, variance, result)
@@ -85,19 +81,9 @@ def _looked_up(
         # The tube's angle of a column's centre; its projection reads no coarser mip levels.
         angle = np.pi * (1.0 - 2.0 * ("RGB".index(shared[0]) + 0.5) / COLUMNS)
         x, y = (float(0.5 + 0.5 * wave) for wave in (np.sin(angle), np.cos(angle)))
-        texture = b.node(
-            "ShaderNodeTexImage",
-            f"Bands {shared}",
-            image=image,
-            projection="TUBE",
-            interpolation="Linear",
-            extension="EXTEND",
-        )
-        b.feed(texture.inputs["Vector"], b.combine(x, y, v))
-        value = b.node("ShaderNodeSeparateColor")
-        b.feed(value.inputs["Color"], texture.outputs["Color"])
+        value = b.look_up(image, f"Bands {shared}", x, y, v)
         for factors, output in zip(bands, ("Red", "Green", "Blue"), strict=True):
-            factors.update(dict.fromkeys(shared, value.outputs[output]))
+            factors.update(dict.fromkeys(shared, value[output]))
     for name, factors in zip(ids.BANDS, bands, strict=True):
         b.feed(result[name], b.combine(factors["R"], factors["G"], factors["B"]))
 
@@ -113,20 +99,7 @@ def bands_image(table: Table) -> bpy.types.Image:
     table.image.pixels.foreach_get(flat)
     values = flat.reshape(height, width, 4)[..., :3].astype(np.float64)
     bands = bands_of_table(values, DEFAULT_LAYOUT)
-    image = bpy.data.images.new(
-        f"{ids.BANDS_IMAGE} {name_of(table.key)}",
-        COLUMNS,
-        BAND_ROWS,
-        float_buffer=True,
-        is_data=True,
-    )
-    image.use_half_precision = False
-    image.alpha_mode = "CHANNEL_PACKED"
-    pixels = np.ones((BAND_ROWS, COLUMNS, 4), dtype=np.float32)
-    pixels[..., :3] = bands
-    image.pixels.foreach_set(pixels.ravel())
-    image.update()
-    image.pack()
+    image = packed_image(f"{ids.BANDS_IMAGE} {name_of(table.key)}", bands)
     image[ids.ROLE_KEY] = role
     # Kept in the file even where no light looks it up: a measured one could not be made again.
     table.image.use_fake_user = True
@@ -149,7 +122,7 @@ def harmonics_group() -> bpy.types.ShaderNodeTree:
         for name in ids.COEFFICIENTS:
             declare(b.tree, name, "Vector", tip="Red, green and blue of this polynomial")
         declare(b.tree, ids.RADIANCE, "Vector", output=True)
-        given, result = _ends(b)
+        given, result = b.ends()
         x, y, z = b.separate(given[ids.NORMAL])
         squares = b.math("MULTIPLY", x, x), b.math("MULTIPLY", y, y), b.math("MULTIPLY", z, z)
         basis = [

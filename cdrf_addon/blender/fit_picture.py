@@ -11,6 +11,7 @@ from .. import ids
 from ..core.material_fit import MaterialFit
 from ..core.measured import MeasuredModel
 from .fit_figure import draw_fit
+from .plot import open_in_blender
 
 
 def picture_path(material: bpy.types.Material, folder: Path) -> Path:
@@ -26,12 +27,7 @@ def make_picture(model: MeasuredModel, fit: MaterialFit, scale: float, path: Pat
         OSError: The file cannot be written.
     """
     draw_fit(model, fit, path, scale)
-    old = bpy.data.images.get(ids.FIT_IMAGE)
-    if old is not None and old.library is None:
-        bpy.data.images.remove(old)
-    image = bpy.data.images.load(str(path))
-    image.name = ids.FIT_IMAGE
-    image.pack()
+    open_in_blender(path, ids.FIT_IMAGE)
     return path
 
 

@@ -255,8 +255,7 @@ def under_gloss_group() -> bpy.types.ShaderNodeTree:
         declare(b.tree, LEVEL, default=0.5, low=0.0, high=1.0)
         declare(b.tree, ids.WEIGHT, default=1.0, low=0.0, high=1.0, tip="Part that is glossy")
         declare(b.tree, ids.FACTOR, output=True)
-        given = b.node("NodeGroupInput").outputs
-        result = b.node("NodeGroupOutput").inputs
+        given, result = b.ends()
         geometry = b.node("ShaderNodeNewGeometry").outputs
         unset = b.math("LESS_THAN", b.vector("DOT_PRODUCT", *(given[ids.NORMAL],) * 2), 1e-12)
         own = b.vector("SCALE", geometry["Normal"], scale=unset)

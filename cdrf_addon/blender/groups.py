@@ -40,10 +40,6 @@ PARTS = {"R": "Red", "G": "Green", "B": "Blue"}
 SOFT_RADIUS2 = 1e-6  # EEVEE treats a point light as a sphere of at least 1 mm
 
 
-def _ends(b: TreeBuilder) -> tuple[Any, Any]:
-    return b.node("NodeGroupInput").outputs, b.node("NodeGroupOutput").inputs
-
-
 def reflectance_group(
     channels: str, table: Table, *, own_cosines: bool = False
 ) -> bpy.types.ShaderNodeTree:
@@ -69,7 +65,7 @@ def reflectance_group(
         )
         declare(b.tree, ids.VARIANCE, "Vector", tip="Squared blur width of each channel")
         declare(b.tree, ids.REFLECTANCE, "Vector", output=True)
-        given, result = _ends(b)
+        given, result = b.ends()
         layout = DEFAULT_LAYOUT
         if own_cosines:
             cosines = dict(zip("RGB", b.separate(given[ids.COSINE]), strict=True))
@@ -83,19 +79,9 @@ def reflectance_group(
             w = b.math("MINIMUM", VARIANCE_MAX, variance[shared[0]])
             w = b.math("SQRT", b.math("SQRT", b.math("MAXIMUM", 0.0, w)))
             v = b.math("MULTIPLY_ADD", w, layout.row_scale / VARIANCE_MAX**0.25, layout.row_offset)
-            texture = b.node(
-                "ShaderNodeTexImage",
-                f"Look-up {shared}",
-                image=table.image,
-                projection="TUBE",
-                interpolation="Linear",
-                extension="EXTEND",
-            )
-            b.feed(texture.inputs["Vector"], b.combine(across, along, v))
-            value = b.node("ShaderNodeSeparateColor")
-            b.feed(value.inputs["Color"], texture.outputs["Color"])
+            value = b.look_up(table.image, f"Look-up {shared}", across, along, v)
             for channel in shared:
-                f[channel] = value.outputs[PARTS[channel] if table.colour else "Red"]
+                f[channel] = value[PARTS[channel] if table.colour else "Red"]
         b.feed(result[ids.REFLECTANCE], b.combine(f["R"], f["G"], f["B"]))
 
     name = f"CDRF Reflectance {name_of(table.key)} {'+'.join(channels.split())}"
@@ -123,7 +109,7 @@ def detail_group() -> bpy.types.ShaderNodeTree:
         declare(b.tree, ids.SIGMA0, default=0.0, tip="Scatter distance of the channel")
         declare(b.tree, ids.DETAIL_SIZE, default=0.0, tip="Wavelength of the map's detail")
         declare(b.tree, ids.WEIGHT, output=True)
-        given, result = _ends(b)
+        given, result = b.ends()
         # Blender's division by zero is zero: all detail stays.
         ratio = b.math("DIVIDE", given[ids.SIGMA0], given[ids.DETAIL_SIZE])
         square = b.math("MULTIPLY", b.math("MULTIPLY", ratio, ratio), PHASE**2)
@@ -150,7 +136,7 @@ def diffused_group() -> bpy.types.ShaderNodeTree:
         declare(b.tree, ids.LENGTH, default=1.0, tip="The shortest length")
         declare(b.tree, ids.SIGMA0, default=0.0, tip="Scatter distance of the channel")
         declare(b.tree, ids.CURVATURE, output=True)
-        given, result = _ends(b)
+        given, result = b.ends()
         length = b.math("MULTIPLY", given[ids.SIGMA0], LENGTH_PER_SIGMA0)
         ratio = b.math("MAXIMUM", b.math("DIVIDE", length, given[ids.LENGTH]), 1.0)
         place = b.math("LOGARITHM", ratio, LEVEL_RATIO)
@@ -213,7 +199,7 @@ def sun_group() -> bpy.types.ShaderNodeTree:
         _declare_light(b.tree)
         declare(b.tree, ids.AXIS_Z, "Vector", tip="Towards the sun, any length")
         declare(b.tree, ids.SIN2_HALF_ANGLE, low=0.0, high=1.0)
-        given, result = _ends(b)
+        given, result = b.ends()
         variance, gain = _finite(b, given[ids.SIN2_HALF_ANGLE], given[ids.GAIN])
         b.feed(result[ids.DIRECTION], b.vector("NORMALIZE", given[ids.AXIS_Z]))
         b.feed(result[ids.RADIANCE], b.vector("SCALE", given[ids.POWER], scale=gain))
@@ -230,7 +216,7 @@ def point_group() -> bpy.types.ShaderNodeTree:
         _declare_local(b.tree)
         declare(b.tree, ids.RADIUS, low=0.0)
         declare(b.tree, ids.SOFT_FALLOFF, low=0.0, high=1.0)
-        given, result = _ends(b)
+        given, result = b.ends()
         to_light, distance2 = _towards(b, given[ids.POSITION])
         radius2 = b.math("MULTIPLY", given[ids.RADIUS], given[ids.RADIUS])
         softened = b.math("MULTIPLY_ADD", radius2, given[ids.SOFT_FALLOFF], distance2)
@@ -262,7 +248,7 @@ def spot_group() -> bpy.types.ShaderNodeTree:
             declare(b.tree, axis, "Vector", tip="Axis of the lamp, as long as the lamp is scaled")
         declare(b.tree, ids.CONE_COSINE, low=-1.0, high=1.0)
         declare(b.tree, ids.CONE_SHARPNESS, low=0.0)
-        given, result = _ends(b)
+        given, result = b.ends()
         point = b.group(
             point_group(),
             "Point",
@@ -327,7 +313,7 @@ def area_group(*, elliptic: bool) -> bpy.types.ShaderNodeTree:
         declare(b.tree, ids.HALF_X, low=0.0, tip="Half of the shape's size along X")
         declare(b.tree, ids.HALF_Y, low=0.0, tip="Half of the shape's size along Y")
         declare(b.tree, ids.NORMALIZE, default=1.0, low=0.0, high=1.0)
-        given, result = _ends(b)
+        given, result = b.ends()
         centre, distance2 = _towards(b, given[ids.POSITION])
         right = b.vector("SCALE", given[ids.AXIS_X], scale=given[ids.HALF_X])
         up = b.vector("SCALE", given[ids.AXIS_Y], scale=given[ids.HALF_Y])
@@ -388,7 +374,7 @@ def display_group(*, signed: bool) -> bpy.types.ShaderNodeTree:
         declare(b.tree, ids.MAXIMUM, default=1.0, tip="Shown in the last colour")
         declare(b.tree, ids.MARK, default=0.0, tip="1 where the curvature was filled in")
         declare(b.tree, ids.SHADER, "Shader", output=True)
-        given, result = _ends(b)
+        given, result = b.ends()
         part = b.node("ShaderNodeMapRange", clamp=True)
         b.feed(part.inputs["Value"], given[ids.CURVATURE])
         b.feed(part.inputs["From Min"], given[ids.MINIMUM])

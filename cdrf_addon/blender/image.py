@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import ids
 from ..core.errors import SceneError
-from ..core.lut import DEFAULT_LAYOUT, build_lut
+from ..core.lut import build_lut
 from ..core.models import RING, SPHERE, Model, name_of, ring, sphere
 
 LUT_VERSION = 5
@@ -69,23 +70,10 @@ def ensure_table(model: Model) -> Table:
     found = find_table(model.key)
     if found is not None:
         return found
-    layout = DEFAULT_LAYOUT
     values = build_lut(model)
-    image = bpy.data.images.new(
-        f"{ids.LUT_IMAGE} {name_of(model.key)}",
-        layout.width,
-        layout.height,
-        float_buffer=True,
-        is_data=True,
+    image = packed_image(
+        f"{ids.LUT_IMAGE} {name_of(model.key)}", values if model.colour else values[..., None]
     )
-    # Half precision would cost a factor of four in accuracy (docs/decisions/002-lut-mapping.md).
-    image.use_half_precision = False
-    image.alpha_mode = "CHANNEL_PACKED"
-    pixels = np.ones((layout.height, layout.width, 4), dtype=np.float32)
-    pixels[..., :3] = values if model.colour else values[..., None]
-    image.pixels.foreach_set(pixels.ravel())
-    image.update()
-    image.pack()
     image[ids.ROLE_KEY] = ids.ROLE_LUT
     image[ids.VERSION_KEY] = LUT_VERSION
     image[ids.MODEL_KEY] = model.key
@@ -93,3 +81,18 @@ def ensure_table(model: Model) -> Table:
     image[ids.MOMENTS_KEY] = model.moments
     image[ids.GAIN_KEY] = model.gain
     return Table(image, model.key, model.colour, model.moments, model.gain)
+
+
+def packed_image(name: str, values: NDArray[np.floating]) -> bpy.types.Image:
+    """Make a packed float image of numbers, (height, width, 3) or (height, width, 1)."""
+    height, width = values.shape[:2]
+    image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=True)
+    # Half precision would cost a factor of four in accuracy (docs/decisions/002-lut-mapping.md).
+    image.use_half_precision = False
+    image.alpha_mode = "CHANNEL_PACKED"
+    pixels = np.ones((height, width, 4), dtype=np.float32)
+    pixels[..., :3] = values
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    image.pack()
+    return image

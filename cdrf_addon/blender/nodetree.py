@@ -82,6 +82,25 @@ class TreeBuilder:
         self.feed(node.inputs["Vector"], vector)
         return tuple(node.outputs[name] for name in "XYZ")
 
+    def ends(self) -> tuple[Any, Any]:
+        """Add the group's input and output; return the sockets that they offer."""
+        return self.node("NodeGroupInput").outputs, self.node("NodeGroupOutput").inputs
+
+    def look_up(self, image: bpy.types.Image, label: str, *place: Any) -> Any:
+        """Read an image by tube projection at x, y, z; return the outputs Red, Green and Blue."""
+        texture = self.node(
+            "ShaderNodeTexImage",
+            label,
+            image=image,
+            projection="TUBE",
+            interpolation="Linear",
+            extension="EXTEND",
+        )
+        self.feed(texture.inputs["Vector"], self.combine(*place))
+        parts = self.node("ShaderNodeSeparateColor")
+        self.feed(parts.inputs["Color"], texture.outputs["Color"])
+        return parts.outputs
+
     def arrange(self) -> None:
         """Place each node one column right of the furthest node it depends on."""
         depth: dict[str, int] = {}

@@ -362,7 +362,7 @@ class Setup:
         self._own = {
             slot.material: read_scattering(slot.material)
             for slot in self.slots
-            if slot.material is not None
+            if slot.material is not None and _asks_for_sigma0(slot.material)
         }
         self._give_materials()
         lights = scene_lights(self.scene, self.view_layer)
@@ -455,7 +455,7 @@ class Setup:
         work = self._work_of(material)
         if fresh:
             node.inputs[ids.SIGMA0_RATIO].default_value = ratio
-            own = self._own.get(material) if settings.chosen_sigma0 < 0.0 else None
+            own = self._own.get(material)
             if own is not None:
                 reflectance_models.set_scattering(material, own)
                 self.report.read.append(material.name)
@@ -552,6 +552,11 @@ def linked_skins(item: bpy.types.Object) -> list[bpy.types.Material]:
 def _present_source(material: bpy.types.Material) -> str:
     node = cdrf_node(material)
     return shader.stamped_variant(node.node_tree).source if node is not None else ""
+
+
+def _asks_for_sigma0(material: bpy.types.Material) -> bool:
+    """Tell whether nobody has chosen a scatter distance yet; reading one may mean a picture."""
+    return cdrf_node(material) is None and material.cdrf.chosen_sigma0 < 0.0
 
 
 def _materials(item: bpy.types.Object) -> set[bpy.types.Material]:

@@ -313,8 +313,7 @@ def _build(
         declare(
             b.tree, ids.CURVATURE, default=0.0, low=0.0, tip="Curvature of the whole mesh, 1/length"
         )
-    given = b.node("NodeGroupInput").outputs
-    result = b.node("NodeGroupOutput").inputs
+    given, result = b.ends()
     total: Any = (0.0, 0.0, 0.0)
     if world is not None and world.environment.is_black:
         world = None

@@ -52,8 +52,7 @@ def edge_group() -> bpy.types.ShaderNodeTree:
         declare(b.tree, ids.DIRECTION, "Vector", tip="Towards the light")
         declare(b.tree, ids.WIDTH, "Vector", tip="Sigma0 of red, green and blue")
         declare(b.tree, ids.VISIBILITY, "Vector", output=True)
-        given = b.node("NodeGroupInput").outputs
-        result = b.node("NodeGroupOutput").inputs
+        given, result = b.ends()
         widths = b.separate(given[ids.WIDTH])
         widest = b.math("MAXIMUM", b.math("MAXIMUM", widths[0], widths[1]), widths[2])
         hits = _hits(b, given[ids.DIRECTION], widest)

@@ -122,8 +122,7 @@ def lit_group(*, translucent: bool) -> bpy.types.ShaderNodeTree:
     def build(b: TreeBuilder) -> None:
         declare(b.tree, ids.NORMAL, "Vector", tip="Direction from which light is received")
         declare(b.tree, ids.LIT, output=True)
-        given = b.node("NodeGroupInput").outputs
-        result = b.node("NodeGroupOutput").inputs
+        given, result = b.ends()
         bsdf = b.node(f"ShaderNodeBsdf{kind}")
         b.feed(bsdf.inputs["Color"], (1.0, 1.0, 1.0, 1.0))
         b.feed(bsdf.inputs["Normal"], given[ids.NORMAL])

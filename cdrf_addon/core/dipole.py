@@ -18,6 +18,12 @@ import numpy as np
 from .errors import ParameterError
 
 
+def mismatch(eta: float) -> float:
+    """Return A = (1 + F_dr) / (1 - F_dr): how much a boundary of that index reflects inwards."""
+    inside = -1.440 / eta**2 + 0.710 / eta + 0.668 + 0.0636 * eta
+    return (1.0 + inside) / (1.0 - inside)
+
+
 @dataclass(frozen=True)
 class Medium:
     """What a material does to one colour of light.
@@ -53,10 +59,8 @@ class Medium:
     @property
     def depths(self) -> tuple[float, float]:
         """Depth of the real source and height of the virtual one, mm."""
-        inside = -1.440 / self.eta**2 + 0.710 / self.eta + 0.668 + 0.0636 * self.eta
-        boundary = (1.0 + inside) / (1.0 - inside)
         real = 1.0 / self.extinction
-        return real, real * (1.0 + 4.0 / 3.0 * boundary)
+        return real, real * (1.0 + 4.0 / 3.0 * mismatch(self.eta))
 
     @property
     def albedo(self) -> float:

@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .dipole import mismatch
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
@@ -54,8 +56,7 @@ def sigma0_per_radius(albedo: ArrayLike, method: str = RANDOM_WALK) -> NDArray[n
 
 def _skin_free_path(albedo: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return sqrt(3 (1 - alpha')) of the dipole with this diffuse reflectance, by bisection."""
-    inside = -1.440 / ETA**2 + 0.710 / ETA + 0.668 + 0.0636 * ETA
-    depth = 4.0 / 3.0 * (1.0 + inside) / (1.0 - inside)
+    depth = 4.0 / 3.0 * mismatch(ETA)
     low, high = np.zeros_like(albedo), np.ones_like(albedo)
     for _ in range(50):
         middle = (low + high) / 2.0
