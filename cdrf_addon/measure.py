@@ -29,7 +29,7 @@ from .core.errors import MeasurementError
 from .core.measurement import SphereMeasurement, bin_pixels, load, pool, save
 from .core.progress import run_steps
 
-VERSION = 3
+VERSION = 4
 """Part of the cache's key: raise it when the worker measures something else."""
 WORKER = Path(__file__).resolve().with_name("measure_worker.py")
 PROGRESS = "CDRF-PROGRESS"
@@ -54,7 +54,7 @@ class Quality:
 
 QUALITIES = {
     "preview": Quality((64, 12), 8, 4),
-    "default": Quality((80, 20), 32, 8),
+    "default": Quality((80, 20), 30, 8),
     "fine": Quality((96, 24), 64, 8),
 }
 DEFAULT_QUALITY = "default"
@@ -109,7 +109,7 @@ class Request:
 
     def samples(self) -> int:
         """Paths through a pixel in a pass: more where the albedo is low and paths are short."""
-        return round(QUALITIES[self.quality].samples * (2.0 - sum(self.albedo) / 3.0) ** 1.5)
+        return round(QUALITIES[self.quality].samples * (2.0 - sum(self.albedo) / 3.0) ** 1.1)
 
     def orders(self) -> dict[str, Any]:
         """Pixels, directions of the light and passes from each."""
@@ -234,10 +234,14 @@ def _render(request: Request, folder: Path) -> Iterator[tuple[float, str]]:
     log = folder / "log.txt"
     told = (0.0, "Starting Blender for the path tracing")
     with _child(command, log) as child:
-        while child.poll() is None:
+        ended = False
+        while not ended:
+            # Asked first, so that the last words of a child that was quick are heard too.
+            ended = child.poll() is not None
             told = _progress(log) or told
             yield told
-            time.sleep(POLL_SECONDS)
+            if not ended:
+                time.sleep(POLL_SECONDS)
     if child.returncode != 0 or not (folder / "answer.npz").exists():
         raise MeasurementError(
             f"Cycles could not render the spheres: {_reason(log, child.returncode)} Check that "
