@@ -215,8 +215,10 @@ def timed(call: Callable[[], Any], patience: float) -> tuple[Any, dict[str, floa
 def write_meshes(folder: Path, name: str, size: int, noises: Sequence[float]) -> dict[str, int]:
     """Make a surface and its noisy copies, as files that a measurement loads without waste."""
     surface = ALL_SURFACES[name](size)
-    for level, noise in enumerate(noises):
-        moved = noisy(surface, noise, np.random.default_rng((SEED, level))) if noise else surface
+    for noise in noises:
+        # The seed follows from the noise, so that a run of some noises makes the same meshes.
+        generator = np.random.default_rng((SEED, round(noise * 1e9)))
+        moved = noisy(surface, noise, generator) if noise else surface
         np.save(folder / f"vertices {noise}.npy", moved.vertices)
     np.save(folder / "triangles.npy", surface.triangles)
     np.save(folder / "exact.npy", np.stack((surface.k1, surface.k2)))
