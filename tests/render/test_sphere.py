@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from rig import Rig, cdrf_node
+from scipy.integrate import quad
 from tolerances import FOUR_LIGHTS, SHADER, WRITTEN, Bound
 
 from cdrf_addon.core.finite_light import SPHERE_GAIN, finite_light
@@ -172,3 +173,29 @@ def test_each_light_type_alone_and_all_at_once(rig: Rig, kinds: list[str]) -> No
         lamp.data.cutoff_distance = math.sqrt(lamp.data.energy * peak / (100.0 * threshold))
     error = rig.render()[covered][:, 0] - expected / peak
     assert_within(error, WRITTEN if len(kinds) == 1 else FOUR_LIGHTS, "+".join(kinds))
+
+
+@pytest.mark.parametrize("kind", [SPHERE, RING])
+def test_energy_that_leaves_a_closed_sphere(rig: Rig, kind: str) -> None:
+    # Lit across the view, the visible half is the mirror image of the other.
+    rig.light("SUN", energy=math.pi, angle=0.0, rotation=(math.pi / 2, 0.0, math.pi / 2))
+    ball = white_sphere(rig)
+    material = ball.data.materials[0]
+    material.cdrf.model = kind
+    normals, covered = rig.normals(ball)
+    cosine = normals[covered][:, 0]
+    order = np.argsort(cosine)
+    # To both poles of the light, where no pixel's centre is.
+    ends = np.concatenate(([-1.0], cosine[order], [1.0]))
+    for sigma in (0.0, 0.1, 0.3, 1.0, 3.0, 30.0):
+        material.cdrf.sigma0 = sigma
+        value, _ = rig.render_exact(ball, "Shader", -0.01, 1.01)
+        seen = value[covered][order, 0]
+        found = 0.5 * np.trapezoid(np.concatenate((seen[:1], seen, seen[-1:])), ends)
+        # Heat is neither made nor lost: a disc's share of a sphere, 1/4. The ring's blur is along
+        # a circle, where the poles weigh as much as the equator, and so makes light.
+        expected = 0.25
+        if kind == RING:
+            expected = 0.5 * quad(lambda t: ring().evaluate(t, sigma) * math.sin(t), 0, math.pi)[0]
+        # 1e-4 is the look-up's; what is left out beyond the outermost pixels less.
+        assert abs(found - expected) <= 1e-4, (sigma, found, expected)
