@@ -34,10 +34,11 @@ from ..core.presets import Preset, in_units
 from ..core.scattering import sigma0_per_radius
 from . import shader, world
 from .image import ensure_table, find_table, table_of
-from .lights import SceneLight, scene_lights
+from .lights import SceneLight
 from .materials import cdrf_node, install, require_editable
 from .read_material import Scattering
 from .shadows import Choice, choose
+from .skin_lights import lights_on_skin
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -296,4 +297,4 @@ def scene_of_group(
     scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
     if scene is None:
         return None
-    return scene, scene_lights(scene, _view_layer(group))
+    return scene, lights_on_skin(scene, _view_layer(group))
