@@ -283,6 +283,16 @@ def refresh_shadows(material: bpy.types.Material) -> None:
         change_variant(material, shadows=choose(material, layer))
 
 
+def refresh_lights(material: bpy.types.Material) -> None:
+    """Give a translucent material's group the lights that its scene has now."""
+    node = cdrf_node(material)
+    where = scene_of_group(node.node_tree) if node is not None else None
+    if node is None or where is None or not material.is_editable:
+        return
+    variant, light = shader.stamped_variant(node.node_tree), world.stamped(node.node_tree)
+    install(material, shader.ensure_shader_group(variant, *where, light))
+
+
 def _view_layer(group: bpy.types.ShaderNodeTree) -> bpy.types.ViewLayer | None:
     scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
     if scene is None or bpy.context.scene == scene:
