@@ -30,6 +30,7 @@ from .ambient_nodes import (
     feed_sun,
     harmonics_node,
     occlusion_node,
+    world_rotation,
     world_strength,
 )
 from .groups import SEPARATE, detail_group, diffused_group, light_group, reflectance_group
@@ -396,13 +397,14 @@ def _with_world(
     bands = None
     if has_bands(variant, world, table):
         bands = b.group(bands_group(variant.channels, table), "Bands", Variance=variance).outputs
-    light: Any = _per_set(b, normal, lambda own: harmonics_node(b, world, own, bands))
+    rotation = world_rotation(b, world)
+    light: Any = _per_set(b, normal, lambda own: harmonics_node(b, world, own, bands, rotation))
     if environment.sun is not None:
         sun = SceneLight(None, "SUN", environment.sun.sin2_half_angle > SMALL_SUN)
         lookups = branch_lookups(table, variant, sun)
         node = b.group(light_group("SUN"), "World Sun")
         node.inputs[ids.GAIN].default_value = table.gain
-        feed_sun(node, environment.sun)
+        feed_sun(b, node, world, environment.sun, rotation)
         f = b.group(
             reflectance_group(lookups, table, own_cosines=len(normal) > 1),
             "Reflectance World Sun",

@@ -19,13 +19,16 @@ from .lights import SceneLight, scene_lights
 from .materials import cdrf_node
 
 
-def shows_skin(view_layer: bpy.types.ViewLayer) -> bool:
-    """Tell whether anything in a view layer is translucent."""
+def _shows(
+    view_layer: bpy.types.ViewLayer,
+    skins: set[bpy.types.Material],
+    fresh: set[bpy.types.Object],
+) -> bool:
+    """Tell whether anything in a view layer is translucent, or about to be."""
     return any(
-        cdrf_node(slot.material) is not None
+        item in fresh or any(slot.material in skins for slot in item.material_slots)
         for item in shown_objects(view_layer)
         if item.type == "MESH"
-        for slot in item.material_slots
     )
 
 
@@ -41,13 +44,10 @@ def lights_on_skin(
         view_layer: Counts whether or not it is rendered.
         fresh: Objects that are about to become translucent.
     """
-    fresh = set(fresh)
-    layers = [
-        layer
-        for layer in scene.view_layers
-        if layer == view_layer
-        or (layer.use and (shows_skin(layer) or not fresh.isdisjoint(shown_objects(layer))))
-    ]
+    layers, others = [view_layer], [one for one in scene.view_layers if one != view_layer]
+    if others:  # asked at every redraw of the panel, so not without need
+        skins = {skin for skin in bpy.data.materials if cdrf_node(skin) is not None}
+        layers += [one for one in others if one.use and _shows(one, skins, set(fresh))]
     found: dict[bpy.types.Object, SceneLight] = {}
     everywhere: set[bpy.types.Object] = set()
     for number, layer in enumerate(layers):

@@ -285,6 +285,14 @@ def test_occlusion_darkens_a_corner_and_is_absent_otherwise(rig: Rig) -> None:
     assert "ShaderNodeAmbientOcclusion" not in kinds(floor)
 
 
+def hazy(height: int = 128, width: int = 256) -> np.ndarray:
+    """A sky of several colours with a sun in haze: as smooth as its pixels, wherever they lie."""
+    d = panorama_directions(height, width)
+    axis = np.array([-0.6, 0.5, 0.6]) / np.linalg.norm((-0.6, 0.5, 0.6))
+    sky = 0.4 + 0.2 * d * (1.0, -1.0, 0.7) + 0.1 * (d[..., :1] * d[..., 2:])
+    return sky + np.exp(40.0 * (d @ axis - 1.0))[..., None] * (20.0, 18.0, 14.0)
+
+
 def mapped(rig: Rig, *, kind: str = "POINT") -> bpy.types.ShaderNode:
     """Put Texture Coordinate -> Mapping before the world's picture."""
     tree = rig.scene.world.node_tree
@@ -295,12 +303,14 @@ def mapped(rig: Rig, *, kind: str = "POINT") -> bpy.types.ShaderNode:
     return turn
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param("POINT", marks=pytest.mark.smoke), "TEXTURE", "VECTOR"]
-)
+@pytest.mark.parametrize("kind", [pytest.param("POINT", marks=pytest.mark.smoke), "TEXTURE"])
 def test_a_turned_picture_is_followed(rig: Rig, kind: str) -> None:
-    """As a fresh Update sees the same world where the pattern is hidden behind another node."""
-    picture(rig, sunny(128, 256))
+    """As a fresh Update sees the same world where the pattern is hidden behind another node.
+
+    Cycles looks at the picture with eight samples for each pixel, so the picture must be smooth.
+    """
+    rig.scene.render.resolution_x = rig.scene.render.resolution_y = 32
+    picture(rig, hazy())
     turn = mapped(rig, kind=kind)
     turn.inputs["Rotation"].default_value = (0.1, 0.2, 0.3)
     ball = white(rig)
@@ -352,6 +362,8 @@ def test_only_a_picture_that_is_merely_turned_is_followed(rig: Rig) -> None:
     turn.inputs["Location"].default_value = (0.0, 0.0, 0.5)
     assert not follows()
     turn.inputs["Location"].default_value = (0.0, 0.0, 0.0)
+    assert follows()
+    turn.vector_type = "VECTOR"
     assert follows()
     turn.mute = True
     assert not follows()
