@@ -106,7 +106,7 @@ def test_keyframed_sigma0_plays(lit: Lit) -> None:
     assert_lit_from(lit, axis_of(lit.sun))
 
 
-def test_moved_point_light(rig: Rig) -> None:
+def test_moved_recoloured_and_stronger_point_light(rig: Rig) -> None:
     lamp = rig.light("POINT", energy=1.0, location=(0.0, -3.0, 0.0))
     ball = rig.sphere()
     bpy.ops.cdrf.setup()
@@ -117,11 +117,12 @@ def test_moved_point_light(rig: Rig) -> None:
     lamp.location = (2.0, -1.0, 1.0)
     lamp.data.energy = 4.0 * math.pi**2 * 6.0
     lamp.data.use_custom_distance, lamp.data.cutoff_distance = True, 1e3
+    lamp.data.color = colour = (1.0, 0.5, 0.25)
     to_light = np.array(lamp.location) - point[covered]
     distance = np.linalg.norm(to_light, axis=1)
     cosine = (normal[covered] * to_light).sum(axis=1) / distance
     expected = 6.0 / distance**2 * sphere_reflectance(np.arccos(np.clip(cosine, -1.0, 1.0)), SIGMA)
-    error = rig.render()[covered][:, 0] - expected
+    error = rig.render()[covered][:, :3] - expected[:, None] * colour
     assert np.abs(error).max() <= WRITTEN.worst * expected.max()
 
 
