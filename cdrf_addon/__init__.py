@@ -10,9 +10,9 @@ from types import ModuleType
 
 
 def _modules() -> tuple[ModuleType, ...]:
-    from . import ops, ops_measure, ops_model, panels, props
+    from . import auto_update, ops, ops_measure, ops_model, panels, props
 
-    return props, ops, ops_model, ops_measure, panels
+    return props, ops, ops_model, ops_measure, panels, auto_update
 
 
 def register() -> None:

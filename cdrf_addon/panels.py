@@ -94,6 +94,8 @@ def draw_ambient(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
         world.FIXED: "World as of the last Update",
         world.SCALED: "World; its strength is followed",
     }.get(light.kind, "World; colour and strength followed")
+    if light.rotation():
+        text = "World; strength and rotation followed"
     if light.environment.sun is not None:
         text += ", with a sun"
     layout.label(text=text, icon="WORLD")

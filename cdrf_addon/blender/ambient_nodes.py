@@ -2,8 +2,8 @@
 """The nodes of the world's light: static groups, and its branch in a scene's shader group.
 
     Variance -> Bands (what the skin leaves of bands 0 to 2) --+
-    Normal ----------------------------------------------------+-> Harmonics -+
-    the world's sun, as any other sun -> x f ---------------------------------+-> x World -> + total
+    Normal -> turned as the world's picture is ----------------+-> Harmonics -+
+    the world's sun, turned back, as any other sun -> x f --------------------+-> x World -> + total
 
 Only what a world has is there: a plain one is one node, or two where the model wins energy.
 """
@@ -161,12 +161,42 @@ def world_strength(b: TreeBuilder, light: WorldLight) -> Any:
     return node.outputs["Vector"]
 
 
-def harmonics_node(b: TreeBuilder, light: WorldLight, normal: Any, bands: Any) -> Any:
-    """Radiance of the world without its sun; `bands` are outputs of a bands group, or None."""
+def world_rotation(b: TreeBuilder, light: WorldLight) -> Any:
+    """Angles around X, Y and Z, driven by the world's Mapping node; None where nothing turns."""
+    paths = light.rotation()
+    if not paths or light.environment.is_uniform:
+        return None
+    node = b.node("ShaderNodeCombineXYZ", "World Rotation")
+    for name, path in zip("XYZ", paths, strict=True):
+        drive(b.tree, node.inputs[name], light.world, "r", {"r": path})
+    return node.outputs["Vector"]
+
+
+def _turned(b: TreeBuilder, vector: Any, rotation: Any, *, inverse: bool) -> Any:
+    node = b.node("ShaderNodeMapping", vector_type="TEXTURE" if inverse else "VECTOR")
+    b.feed(node.inputs["Vector"], vector)
+    b.feed(node.inputs["Rotation"], rotation)
+    return node.outputs["Vector"]
+
+
+def harmonics_node(
+    b: TreeBuilder, light: WorldLight, normal: Any, bands: Any, rotation: Any = None
+) -> Any:
+    """Radiance of the world without its sun.
+
+    Args:
+        b: Builder of the shader group.
+        light: The world's.
+        normal: Socket of the normal, or None where it makes no difference.
+        bands: Outputs of a bands group, or None.
+        rotation: What `world_rotation` returned.
+    """
     coefficients = shader_coefficients(light.environment.harmonics)
     if light.environment.is_uniform:
         constant = tuple(float(part) for part in coefficients[0])
         return constant if bands is None else b.vector("MULTIPLY", bands[ids.BANDS[0]], constant)
+    if rotation is not None:
+        normal = _turned(b, normal, rotation, inverse=light.inverse)
     node = b.group(harmonics_group(), "World Harmonics")
     b.feed(node.inputs[ids.NORMAL], normal)
     for name in ids.BANDS if bands is not None else ():
@@ -176,10 +206,15 @@ def harmonics_node(b: TreeBuilder, light: WorldLight, normal: Any, bands: Any) -
     return node.outputs[ids.RADIANCE]
 
 
-def feed_sun(node: bpy.types.ShaderNode, sun: Sun) -> None:
+def feed_sun(
+    b: TreeBuilder, node: bpy.types.ShaderNode, light: WorldLight, sun: Sun, rotation: Any
+) -> None:
     """Give an instance of the sun's group the world's sun, which moves only with the world."""
     node.inputs[ids.POWER].default_value = sun.radiance
-    node.inputs[ids.AXIS_Z].default_value = sun.direction
+    axis: Any = sun.direction
+    if rotation is not None:
+        axis = _turned(b, axis, rotation, inverse=not light.inverse)
+    b.feed(node.inputs[ids.AXIS_Z], axis)
     node.inputs[ids.SIN2_HALF_ANGLE].default_value = sun.sin2_half_angle
 
 

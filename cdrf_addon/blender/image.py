@@ -48,6 +48,16 @@ def find_table(key: str) -> Table | None:
     return None
 
 
+def adopt_table(key: str) -> None:
+    """Copy a linked file's table of that key into this file, unless it has one."""
+    if find_table(key) is not None:
+        return
+    for image in list(bpy.data.images):
+        if image.get(ids.ROLE_KEY) == ids.ROLE_LUT and image.get(ids.MODEL_KEY) == key:
+            image.copy()
+            return
+
+
 def table_of(key: str) -> Table:
     """Return the table with that key, made anew where the key says it all.
 

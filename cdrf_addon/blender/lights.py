@@ -45,6 +45,9 @@ class SceneLight:
     """Whether it is, or may become, so large that its size blurs the terminator visibly."""
     casts: bool = True
     """Whether it casts shadows, or may come to by animation."""
+    excluded: tuple[str, ...] = ()
+    """Where some view layers leave it out: paths, from a view layer, of the Exclude flags of its
+    collections. It is dark where all are set."""
 
     @property
     def type(self) -> str:
@@ -111,9 +114,10 @@ def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> lis
 
 
 def _render_visible(layer: bpy.types.LayerCollection) -> set[str]:
-    if layer.exclude or layer.collection.hide_render:
+    if layer.collection.hide_render:
         return set()
-    names = {item.name for item in layer.collection.objects}
+    # A collection inside an excluded one may be shown by itself.
+    names = set() if layer.exclude else {item.name for item in layer.collection.objects}
     for child in layer.children:
         names |= _render_visible(child)
     return names
@@ -165,6 +169,10 @@ def _power(light: SceneLight, channel: int) -> tuple[str, dict[str, str]]:
     elif light.type in {"POINT", "SPOT"}:
         paths |= {"n": "data.normalize", "r": "data.shadow_soft_size"}
         expression += "*(n+(1-n)*4*pi*r*r)"
+    if light.excluded:
+        flags = {f"l{number}": path for number, path in enumerate(light.excluded)}
+        paths |= {name: f"layer:{path}" for name, path in flags.items()}
+        expression += f"*(1-{'*'.join(flags)})"
     return expression, paths
 
 
@@ -225,7 +233,8 @@ def drive(
         socket: An unlinked input; addressed by node and socket name, which survives reordering.
         source: Data the paths start from. A path "scene:..." starts from the active scene.
         expression: Over the names of `paths`, in Blender's Python-free subset.
-        paths: Property path of each name.
+        paths: Property path of each name. A path "layer:..." starts from the view layer that is
+            drawn, and counts as 0 where that layer has no such property.
         index: Component of a vector socket, -1 for a scalar.
     """
     node = bpy.utils.escape_identifier(socket.node.name)
@@ -246,6 +255,12 @@ def drive(
             variable.type = "CONTEXT_PROP"
             variable.targets[0].context_property = "ACTIVE_SCENE"
             variable.targets[0].data_path = where.removeprefix("scene:")
+        elif where.startswith("layer:"):
+            variable.type = "CONTEXT_PROP"
+            variable.targets[0].context_property = "ACTIVE_VIEW_LAYER"
+            variable.targets[0].data_path = where.removeprefix("layer:")
+            # A collection that was renamed since: the light shines until the next Update.
+            variable.targets[0].use_fallback_value = True
         else:
             variable.targets[0].id_type = source.id_type
             variable.targets[0].id = source

@@ -16,6 +16,7 @@ from .. import ids
 from ..core.curvature import Options
 from ..core.errors import MeshError
 from ..core.mesh import TriMesh
+from ..core.summary import VARYING
 from ..core.topology import edge_lengths
 
 if TYPE_CHECKING:
@@ -336,6 +337,12 @@ def has_curvature(mesh: bpy.types.Mesh) -> bool:
     return _holds(mesh, ids.LENGTH_ATTRIBUTE, "FLOAT") and all(
         _holds(mesh, name, "FLOAT_COLOR") for name in _COLOURS
     )
+
+
+def is_measured(mesh: bpy.types.Mesh) -> bool:
+    """Tell whether a mesh carries what was measured of it."""
+    known = mesh.cdrf
+    return bool(known.fingerprint) and (known.kind != VARYING or has_curvature(mesh))
 
 
 def _holds(mesh: bpy.types.Mesh, name: str, kind: str) -> bool:

@@ -34,10 +34,11 @@ from ..core.presets import Preset, in_units
 from ..core.scattering import sigma0_per_radius
 from . import shader, world
 from .image import ensure_table, find_table, table_of
-from .lights import SceneLight, scene_lights
+from .lights import SceneLight
 from .materials import cdrf_node, install, require_editable
 from .read_material import Scattering
 from .shadows import Choice, choose
+from .skin_lights import lights_on_skin
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -282,6 +283,16 @@ def refresh_shadows(material: bpy.types.Material) -> None:
         change_variant(material, shadows=choose(material, layer))
 
 
+def refresh_lights(material: bpy.types.Material) -> None:
+    """Give a translucent material's group the lights that its scene has now."""
+    node = cdrf_node(material)
+    where = scene_of_group(node.node_tree) if node is not None else None
+    if node is None or where is None or not material.is_editable:
+        return
+    variant, light = shader.stamped_variant(node.node_tree), world.stamped(node.node_tree)
+    install(material, shader.ensure_shader_group(variant, *where, light))
+
+
 def _view_layer(group: bpy.types.ShaderNodeTree) -> bpy.types.ViewLayer | None:
     scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
     if scene is None or bpy.context.scene == scene:
@@ -296,4 +307,4 @@ def scene_of_group(
     scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
     if scene is None:
         return None
-    return scene, scene_lights(scene, _view_layer(group))
+    return scene, lights_on_skin(scene, _view_layer(group))

@@ -37,7 +37,9 @@ from ..core.summary import (
     summarise,
 )
 from . import display, gloss, reflectance_models, shader, shadows, state, world
-from .lights import SceneLight, is_linked_to_some, scene_lights
+from .image import adopt_table
+from .instances import shown_objects
+from .lights import SceneLight, is_linked_to_some
 from .materials import cdrf_node, install, is_mapped, require_editable
 from .mesh_io import (
     Shape,
@@ -45,6 +47,8 @@ from .mesh_io import (
     coordinate_noise,
     evaluable,
     has_curvature,
+    is_measured,
+    linear_part,
     mark_filled,
     read_shape,
     remove_curvature,
@@ -52,6 +56,7 @@ from .mesh_io import (
     write_curvature,
 )
 from .read_material import Scattering, read_scattering
+from .skin_lights import lights_on_skin, lit_elsewhere
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,8 +100,8 @@ class _MeshWork:
 
     mesh: bpy.types.Mesh
     users: list[bpy.types.Object] = field(default_factory=list)
-    sizes: dict[str, float] = field(default_factory=dict)
-    """Size of each user relative to the first, by object name."""
+    sizes: set[float] = field(default_factory=lambda: {1.0})
+    """Sizes in which it is seen, by users and their instances, relative to the first user."""
     fingerprint: str = ""
     metric: NDArray[np.float64] | None = None
     summary: CurvatureSummary | None = None
@@ -120,6 +125,12 @@ class _MeshWork:
     @property
     def median(self) -> float:
         return self.summary.median if self.summary else self.mesh.cdrf.median
+
+    @property
+    def length(self) -> float:
+        """Length of the object's X axis, as measured."""
+        assert self.metric is not None
+        return float(self.metric[0, 0] ** 0.5)
 
 
 class Setup:
@@ -155,10 +166,13 @@ class Setup:
         self.report = Report()
         self.slots: list[bpy.types.MaterialSlot] = []
         self.bare: list[bpy.types.Object] = []
+        self.borrowed: list[bpy.types.MaterialSlot] = []
+        """Slots whose translucent material another file owns: they get a copy of it."""
         self._own: dict[bpy.types.Material, Scattering | None] = {}
         self.world: world.WorldLight | None = None
         self._choose(list(objects), only_active_slot, convert)
         self.work = self._gather()
+        self.instances = self._instances()
 
     # --- gathering ----------------------------------------------------------------------------
 
@@ -167,8 +181,11 @@ class Setup:
     ) -> None:
         """Find the material slots to convert and the objects that need a first material."""
         self.objects = []
+        instance = ""
         for item in objects:
             if item.type != "MESH":
+                if item.type == "EMPTY" and item.instance_collection is not None:
+                    instance = item.name
                 if convert and item.type not in {"LIGHT", "CAMERA", "EMPTY"}:
                     self.report.warnings.append(
                         f"'{item.name}' is not a mesh: convert it first (Object > Convert > Mesh)."
@@ -184,30 +201,70 @@ class Setup:
                 raise SceneError(f"'{item.name}' is in Edit Mode: leave it first (Tab).")
             self.objects.append(item)
         if not self.objects:
-            raise SceneError(self._nothing_to_do(convert))
+            raise SceneError(self._nothing_to_do(convert, instance))
         for item in self.objects:
             slots = list(item.material_slots)
             if only_active_slot and slots:
                 slots = [slots[item.active_material_index]]
             if not convert:
-                slots = [slot for slot in slots if cdrf_node(slot.material) is not None]
+                slots = [slot for slot in slots if self._is_ours(slot.material)]
             elif not slots:
                 require_editable(item.data)
                 if all(other.data != item.data for other in self.bare):
                     self.bare.append(item)
             for slot in slots:
+                borrowed = slot.material is not None and not slot.material.is_editable
+                if borrowed and item.is_editable and cdrf_node(slot.material) is not None:
+                    self.borrowed.append(slot)
+                    continue
                 require_editable(slot.material or item.data)
-            self.slots += slots
+                self.slots.append(slot)
+        if not (self.slots or self.bare or self.borrowed):
+            raise SceneError(self.report.warnings[-1])
+        if convert:
+            self._warn_of_other_scenes()
 
-    def _nothing_to_do(self, convert: bool) -> str:
+    def _is_ours(self, material: bpy.types.Material | None) -> bool:
+        """Tell whether Update may change a material: translucent, local, lit by this scene."""
+        if material is None or cdrf_node(material) is None or not material.is_editable:
+            return False
+        other = lit_elsewhere(material, self.scene)
+        if other is not None:
+            line = (
+                f"'{material.name}' was left as it is, with the lights of the scene "
+                f"'{other.name}', where it is seen too. Give this scene objects and materials of "
+                "its own (Object > Relations > Make Single User > Object & Data & Materials) and "
+                "update again, or take them over with Make Translucent."
+            )
+            if line not in self.report.warnings:
+                self.report.warnings.append(line)
+        return other is None
+
+    def _warn_of_other_scenes(self) -> None:
+        for material in dict.fromkeys(slot.material for slot in self.slots):
+            other = lit_elsewhere(material, self.scene) if material is not None else None
+            if other is not None:
+                self.report.warnings.append(
+                    f"'{material.name}' has this scene's lights now, in the scene '{other.name}' "
+                    "too: press Make Translucent there to change back."
+                )
+
+    def _nothing_to_do(self, convert: bool, instance: str) -> str:
+        if convert and instance:
+            return (
+                f"'{instance}' is an instance of a collection: make the objects in it "
+                "translucent, or turn it into a library override (Object > Library Override > "
+                "Make) or into real objects (Object > Apply > Make Instances Real) first."
+            )
         if convert:
             return "No mesh object is selected: click the object that should become translucent."
         if translucent_objects(self.view_layer):
             return "Every translucent object is hidden: show one and update again."
-        if any(linked_skins(item) for item in self.view_layer.objects):
+        if any(linked_skins(item) for item in shown_objects(self.view_layer)):
             return (
-                "The translucent materials here are linked from another file: update them there, "
-                "or make them local (Object > Relations > Make Local)."
+                "The translucent materials here are linked from another file and have its lights: "
+                "update them there, or turn their objects into library overrides (Object > Library "
+                "Override > Make) and press Make Translucent for copies lit by this scene."
             )
         return "Nothing in this scene is translucent yet: press Make Translucent first."
 
@@ -215,7 +272,7 @@ class Setup:
         """Group by mesh all objects of the scene that show one of the materials."""
         materials = {slot.material for slot in self.slots if slot.material is not None}
         users = list(self.objects)
-        for item in self.view_layer.objects:
+        for item in shown_objects(self.view_layer):
             if item.type == "MESH" and item not in users and materials & _materials(item):
                 users.append(item)
         others = len(users) - len(self.objects)
@@ -226,7 +283,8 @@ class Setup:
             )
         work: dict[bpy.types.Mesh, _MeshWork] = {}
         for item in users:
-            require_editable(item.data)
+            if not is_measured(item.data):  # a linked mesh keeps what was measured in its file
+                require_editable(item.data)
             work.setdefault(item.data, _MeshWork(item.data)).users.append(item)
         return list(work.values())
 
@@ -276,15 +334,46 @@ class Setup:
         self.slots = [slot for slot in self.slots if slot.id_data not in owners]
         self.report.warnings.append(f"Left out: {reason}")
 
+    def _instances(self) -> dict[bpy.types.Object, list[NDArray[np.float64]]]:
+        """Metrics (see `Shape`) of the instances of each object."""
+        users = {item for work in self.work for item in work.users}
+        found: dict[bpy.types.Object, list[NDArray[np.float64]]] = {}
+        for instance in self.depsgraph.object_instances:
+            item = instance.object.original if instance.is_instance else None
+            if item in users:
+                linear = linear_part(instance)
+                found.setdefault(item, []).append(linear.T @ linear)
+        return found
+
+    def _keep(self, work: _MeshWork) -> None:
+        """Take a linked mesh's curvature as it is."""
+        known = work.mesh.cdrf
+        work.metric = np.array(known.metric).reshape(3, 3)
+        work.evaluated_vertices = known.evaluated_vertices
+        for item in work.users:
+            linear = linear_part(item)
+            if not np.allclose(
+                linear.T @ linear, work.metric, rtol=0.0, atol=1e-3 * np.trace(work.metric)
+            ):
+                self.report.warnings.append(
+                    f"'{item.name}' has another size than in the file its mesh is linked from, "
+                    "which the scatter distance does not heed: divide it by the scale."
+                )
+
     def _compute(self, work: _MeshWork) -> Generator[float, None, None]:
+        if not work.mesh.is_editable:
+            self._keep(work)
+            yield 1.0
+            return
         start = time.perf_counter()
         first, *others = work.users
         work.options = self.options or known_options(work.mesh)
         with evaluable(work.users, self.view_layer, self.depsgraph):
             shape = read_shape(first, self.depsgraph, work.options)
             for other in others:
-                work.sizes[other.name] = self._relative_size(other, shape, first, work.options)
-        work.sizes[first.name] = 1.0
+                work.sizes.add(self._relative_size(other, shape, first, work.options))
+        for metric in (m for item in work.users for m in self.instances.get(item, ())):
+            work.sizes.add(float((np.trace(metric) / np.trace(shape.metric)) ** 0.5))
         work.fingerprint = shape.fingerprint
         work.metric = shape.metric
         work.evaluated_vertices = len(shape.mesh.vertices)
@@ -365,7 +454,7 @@ class Setup:
             if slot.material is not None and _asks_for_sigma0(slot.material)
         }
         self._give_materials()
-        lights = scene_lights(self.scene, self.view_layer)
+        lights = lights_on_skin(self.scene, self.view_layer, self.objects)
         sources = {
             material: self._source(material)
             for material in dict.fromkeys(slot.material for slot in self.slots)
@@ -386,6 +475,19 @@ class Setup:
         for slot in self.slots:
             if slot.material is None:
                 slot.material = _new_material(slot.id_data.name)
+        copies: dict[bpy.types.Material, bpy.types.Material] = {}
+        for slot in self.borrowed:
+            linked = slot.material
+            if linked not in copies:
+                copies[linked] = linked.copy()
+                adopt_table(reflectance_models.model_key(linked))
+                self.report.warnings.append(
+                    f"'{linked.name}' is linked: a copy of it is lit by this scene."
+                )
+            if not slot.id_data.data.is_editable:
+                slot.link = "OBJECT"
+            slot.material = copies[linked]
+            self.slots.append(slot)
 
     def _work_of(self, material: bpy.types.Material) -> list[_MeshWork]:
         return [
@@ -397,7 +499,7 @@ class Setup:
         work = self._work_of(material)
         if all(item.kind == FLAT for item in work):
             return shader.FLAT
-        if any(abs(size - 1.0) > SAME_SIZE for item in work for size in item.sizes.values()):
+        if any(abs(size - 1.0) > SAME_SIZE for item in work for size in item.sizes):
             return shader.SCALED
         if all(item.kind == CONSTANT for item in work):
             kappas = [item.mean_values[0] for item in work]
@@ -406,6 +508,8 @@ class Setup:
         return shader.ATTRIBUTE
 
     def _store(self, work: _MeshWork, sources: dict[bpy.types.Material, str]) -> None:
+        if not work.mesh.is_editable:
+            return
         # Materials outside this job may be translucent too and read the same attribute.
         read = {
             sources.get(material) or _present_source(material)
@@ -427,7 +531,7 @@ class Setup:
         for item in work.users:
             scaled = any(sources.get(m) == shader.SCALED for m in _materials(item))
             if scaled:
-                item[ids.SCALE_KEY] = 1.0 / work.sizes[item.name]
+                item[ids.SCALE_KEY] = work.length
             elif ids.SCALE_KEY in item:
                 del item[ids.SCALE_KEY]
         if work.summary is not None:
@@ -517,10 +621,10 @@ def run(job: Setup) -> Report:
 
 
 def translucent_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
-    """List the mesh objects of a view layer that show a CDRF material of this file."""
+    """List mesh objects with a CDRF material of this file, in instances too."""
     return [
         item
-        for item in view_layer.objects
+        for item in shown_objects(view_layer)
         if item.type == "MESH"
         and any(cdrf_node(material) and material.is_editable for material in _materials(item))
     ]

@@ -30,6 +30,7 @@ from .ambient_nodes import (
     feed_sun,
     harmonics_node,
     occlusion_node,
+    world_rotation,
     world_strength,
 )
 from .groups import SEPARATE, detail_group, diffused_group, light_group, reflectance_group
@@ -40,7 +41,7 @@ from .shadow_edge import edge_group
 from .shadows import NO_SHADOWS, Choice
 from .world import WorldLight, is_same, stamp, stamped
 
-VERSION = 8
+VERSION = 9
 
 # A channel narrower than a hundredth of the widest is Lambert in every row of the table.
 LEAST_MOMENT = 1e-4
@@ -196,7 +197,23 @@ def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) ->
         # Where only the world shines nothing may have used it, and a saved file drops it.
         return not lights and not wired_lights(group)
     wanted = {(light.object, light.kind, branch_lookups(table, variant, light)) for light in lights}
-    return set(wired_lights(group)) == wanted and not shadows_due(group, lights)
+    if layers_due(group, lights) or shadows_due(group, lights):
+        return False
+    return set(wired_lights(group)) == wanted
+
+
+def layers_due(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -> str:
+    """Say which light other view layers leave out than those the group was made for."""
+    targets = _targets(group)
+    wired = {
+        targets.get(node.name): tuple(node.get(ids.EXCLUDED_KEY, "").splitlines())
+        for node in group.nodes
+        if ids.LIGHT_KEY in node
+    }
+    for light in lights:
+        if wired.get(light.object, light.excluded) != light.excluded:
+            return f"light '{light.object.name}' is in other view layers now"
+    return ""
 
 
 def shadows_due(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -> str:
@@ -380,13 +397,14 @@ def _with_world(
     bands = None
     if has_bands(variant, world, table):
         bands = b.group(bands_group(variant.channels, table), "Bands", Variance=variance).outputs
-    light: Any = _per_set(b, normal, lambda own: harmonics_node(b, world, own, bands))
+    rotation = world_rotation(b, world)
+    light: Any = _per_set(b, normal, lambda own: harmonics_node(b, world, own, bands, rotation))
     if environment.sun is not None:
         sun = SceneLight(None, "SUN", environment.sun.sin2_half_angle > SMALL_SUN)
         lookups = branch_lookups(table, variant, sun)
         node = b.group(light_group("SUN"), "World Sun")
         node.inputs[ids.GAIN].default_value = table.gain
-        feed_sun(node, environment.sun)
+        feed_sun(b, node, world, environment.sun, rotation)
         f = b.group(
             reflectance_group(lookups, table, own_cosines=len(normal) > 1),
             "Reflectance World Sun",
@@ -412,6 +430,8 @@ def _light_node(
     node[ids.LIGHT_KEY] = light.kind
     node[ids.LOOKUPS_KEY] = branch_lookups(table, variant, light)
     node[ids.SHADOW_KEY] = variant.shadows.cast and light.casts
+    if light.excluded:
+        node[ids.EXCLUDED_KEY] = "\n".join(light.excluded)
     node.inputs[ids.GAIN].default_value = table.gain
     drive_light(b.tree, node, light)
     return node
@@ -545,10 +565,21 @@ def diffused_node(b: TreeBuilder, levels: dict[str, Any], sigma0: Any) -> Any:
 
 
 def size_node(b: TreeBuilder) -> Any:
-    """Size of the mesh as measured over the size of this object."""
-    return b.node(
+    """Size of the mesh as measured over the size it is seen in, as an instance or by itself.
+
+    Wiring:
+
+        object's X axis -> to world -> length --+
+        object property: the same, as measured -+-> divide
+    """
+    axis = b.node(
+        "ShaderNodeVectorTransform", vector_type="VECTOR", convert_from="OBJECT", convert_to="WORLD"
+    )
+    b.feed(axis.inputs["Vector"], (1.0, 0.0, 0.0))
+    measured = b.node(
         "ShaderNodeAttribute", attribute_type="OBJECT", attribute_name=ids.SCALE_KEY
     ).outputs["Fac"]
+    return b.math("DIVIDE", measured, b.vector("LENGTH", axis.outputs["Vector"]))
 
 
 def curvature_nodes(b: TreeBuilder, *, scaled: bool, signed: bool) -> Any:

@@ -29,6 +29,7 @@ import bpy
 
 from .. import ids
 from ..compat import HAS_RAYCAST
+from .instances import shown_objects
 from .nodetree import TreeBuilder, declare, ensure_group
 
 VERSION = 1
@@ -106,7 +107,7 @@ def _casters(view_layer: bpy.types.ViewLayer) -> int:
     """Count the objects that can cast a shadow; a skin is one of them itself."""
     return sum(
         item.type in SURFACES and item.visible_shadow and not item.hide_render
-        for item in view_layer.objects
+        for item in shown_objects(view_layer)
     )
 
 

@@ -13,9 +13,10 @@ import numpy as np
 from .. import ids
 from . import gloss, shader, shadows, world
 from .image import Table, find_table
-from .lights import SceneLight, scene_lights
+from .lights import SceneLight
 from .materials import cdrf_node, skin_output
-from .mesh_io import base_fingerprint, has_curvature, linear_part
+from .mesh_io import base_fingerprint, has_curvature, is_measured, linear_part
+from .skin_lights import lights_on_skin, lit_elsewhere
 
 _touched: set[int] = set()
 """session_uid of meshes edited since their hash was last compared."""
@@ -83,7 +84,8 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
         resized = [light.object.name for light in lights if _other_lookups(group, table, light)]
         parts = [f"light '{name}' got another size" for name in resized]
     if not parts:
-        parts = [part for part in (shader.shadows_due(group, lights),) if part]
+        due = (shader.layers_due(group, lights), shader.shadows_due(group, lights))
+        parts = [part for part in due if part]
     return "; ".join(parts) or "the node group is incomplete or of an older version"
 
 
@@ -101,16 +103,30 @@ def reasons_to_update(
 ) -> list[str]:
     """List what is out of date about a translucent object, a sentence each; empty if nothing is."""
     reasons = []
-    lights = scene_lights(scene, view_layer)
+    lights = lights_on_skin(scene, view_layer)
     for slot in item.material_slots:
         node = cdrf_node(slot.material)
         if node is None:
             continue
         group = node.node_tree
+        if not slot.material.is_editable:
+            if {item for item, *_ in shader.wired_lights(group)} != {one.object for one in lights}:
+                reasons.append(
+                    f"'{slot.material.name}' is linked and has the lights of its own file: Make "
+                    "Translucent gives a library override of the object a copy lit by this scene."
+                )
+            continue
         if skin_output(slot.material) is None:
             reasons.append("The CDRF Material Output was deleted.")
         if gloss.is_due(slot.material):
             reasons.append("The Principled node was changed: its gloss is that of before.")
+        other = lit_elsewhere(slot.material, scene)
+        if other is not None:
+            reasons.append(
+                f"'{slot.material.name}' has the lights of the scene '{other.name}', where it is "
+                "seen too: make it single-user here and update, or press Make Translucent."
+            )
+            continue
         if group.get(ids.SCENE_KEY) != scene.name:
             reasons.append(f"'{slot.material.name}' was set up in another scene.")
         due = lights_due(group, lights)
@@ -148,6 +164,8 @@ def _shape_reasons(
     item: bpy.types.Object, view_layer: bpy.types.ViewLayer, playing: bool
 ) -> list[str]:
     known = item.data.cdrf
+    if is_measured(item.data) and not item.data.is_editable:
+        return []
     if not known.fingerprint:
         return [f"The curvature of '{item.name}' was never computed."]
     if _mesh_changed(item.data, playing):
@@ -160,7 +178,9 @@ def _shape_reasons(
         return ["The modifiers were changed since the curvature was computed."]
     linear = linear_part(item)
     then = np.array(known.metric).reshape(3, 3)
-    now = linear.T @ linear * float(item.get(ids.SCALE_KEY, 1.0)) ** 2
+    now = linear.T @ linear
+    if ids.SCALE_KEY in item:  # the shader sees to the size, not to the proportions
+        now *= np.trace(then) / max(np.trace(now), 1e-30)
     if not np.allclose(now, then, rtol=0.0, atol=1e-3 * max(np.trace(now), np.trace(then))):
         return ["The object was scaled since its curvature was computed."]
     return []

@@ -3,7 +3,8 @@
 
 A world of one plain Background needs no picture: drivers carry its colour and strength. Any other
 is rendered once, alone, all around (world_capture.py) and kept as nine numbers for each colour;
-the strength of its Background, where it has a plain one, is driven too.
+the strength of its Background, where it has a plain one, is driven too, and so is the rotation of
+a picture's Mapping node: the picture is kept as it lies, and the surface turned instead.
 
 A world is known again by a fingerprint of all its nodes that can change its light, so the same one
 is never rendered twice.
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,6 +55,18 @@ class WorldLight:
     node: str
     """Name of the Background node that drives."""
     environment: Environment
+    mapping: str = ""
+    """Name of the Mapping node whose rotation drives; the environment is that before it."""
+    inverse: bool = False
+    """Whether that node turns the other way (type Texture)."""
+
+    def rotation(self) -> list[str]:
+        """Paths, from the world, of the angles around X, Y and Z; empty if nothing turns."""
+        if not self.mapping or self.world is None:
+            return []
+        name = bpy.utils.escape_identifier(self.mapping)
+        path = f'node_tree.nodes["{name}"].inputs["Rotation"].default_value'
+        return [f"{path}[{i}]" for i in range(3)]
 
     def drivers(self) -> list[tuple[str, dict[str, str]]]:
         """Expression and paths, from the world, of the factor on each channel; empty if fixed."""
@@ -75,6 +89,7 @@ class WorldLight:
                 "node": self.node,
                 "harmonics": np.round(self.environment.harmonics, 9).ravel().tolist(),
                 "sun": [sun.direction, sun.radiance, sun.sin2_half_angle] if sun else None,
+                "mapping": [self.mapping, self.inverse],
             }
         )
 
@@ -87,7 +102,14 @@ def from_text(text: str, fingerprint: str, world: bpy.types.World | None) -> Wor
         direction, radiance, sin2 = parts["sun"]
         sun = Sun(tuple(direction), tuple(radiance), sin2)
     harmonics = np.array(parts["harmonics"]).reshape(9, 3)
-    return WorldLight(world, fingerprint, parts["kind"], parts["node"], Environment(harmonics, sun))
+    return WorldLight(
+        world,
+        fingerprint,
+        parts["kind"],
+        parts["node"],
+        Environment(harmonics, sun),
+        *parts.get("mapping", ("", False)),
+    )
 
 
 @dataclass(frozen=True)
@@ -95,6 +117,12 @@ class _Surface:
     kind: str
     node: bpy.types.ShaderNode | None
     black: bool
+    mapping: bpy.types.ShaderNode | None = None
+
+    def driven(self) -> list[bpy.types.NodeSocket]:
+        """Inputs that drivers follow."""
+        found = [self.node.inputs["Strength"]] if self.node else []
+        return found + ([self.mapping.inputs["Rotation"]] if self.mapping else [])
 
 
 def scene_world(
@@ -110,22 +138,56 @@ def _surface(world: bpy.types.World) -> _Surface:
         return _Surface(COLOUR, None, not (any(world.color) or _animates(world, "color")))
     tree = world.node_tree
     output = tree.get_output_node("EEVEE")
-    socket = output.inputs["Surface"] if output else None
-    while socket is not None and socket.is_linked:
-        node = socket.links[0].from_node
-        if node.type != "REROUTE":
-            break
-        socket = node.inputs[0]
-    if socket is None or not socket.is_linked:
+    node = _source(output.inputs["Surface"]) if output else None
+    if node is None:
         return _Surface(FIXED, None, True)
     if node.type != "BACKGROUND" or node.mute or node.inputs["Strength"].is_linked:
         return _Surface(FIXED, None, False)
     strength, colour = node.inputs["Strength"], node.inputs["Color"]
     dark = not (strength.default_value > 0.0 or _moved(tree, strength))
     if colour.is_linked:
-        return _Surface(SCALED, node, dark)
+        return _Surface(SCALED, node, dark, _mapping(tree, colour))
     dark = dark or not (max(colour.default_value[:3]) > 0.0 or _moved(tree, colour))
     return _Surface(PLAIN, node, dark)
+
+
+def _source(socket: bpy.types.NodeSocket, output: str | None = None) -> bpy.types.ShaderNode | None:
+    """Return the node that feeds a socket; None if none does, or by another output than asked."""
+    while socket.is_linked:
+        link = socket.links[0]
+        if link.from_node.type != "REROUTE":
+            named = output is None or link.from_socket.name == output
+            return link.from_node if named and not link.is_muted else None
+        socket = link.from_node.inputs[0]
+    return None
+
+
+def _mapping(
+    tree: bpy.types.ShaderNodeTree, colour: bpy.types.NodeSocket
+) -> bpy.types.ShaderNode | None:
+    """Return the Mapping node that does no more than turn a world's only picture.
+
+    Texture Coordinate (Generated) -> Mapping -> Environment Texture -> colour
+    """
+    chain = []
+    socket = colour
+    for kind, output in (("TEX_ENVIRONMENT", "Color"), ("MAPPING", "Vector")):
+        node = _source(socket, output)
+        if node is None or node.type != kind or node.mute:
+            return None
+        chain.append(node)
+        socket = node.inputs["Vector"]
+    start = _source(socket, "Generated")
+    if start is None or start.type != "TEX_COORD" or start.mute:
+        return None
+    mapping = chain[-1]
+    for name, neutral in (("Location", 0.0), ("Scale", 1.0)):
+        given = mapping.inputs.get(name)  # a mapping of type Vector has no location
+        if given is None:
+            continue
+        if given.is_linked or _moved(tree, given) or any(v != neutral for v in given.default_value):
+            return None
+    return None if mapping.inputs["Rotation"].is_linked else mapping
 
 
 def _animates(world: bpy.types.World, path: str) -> bool:
@@ -150,7 +212,9 @@ def fingerprint(world: bpy.types.World | None) -> str:
     parts: list[object] = [VERSION, surface.kind, node.name if node else ""]
     if surface.kind in {SCALED, FIXED}:
         parts.append(world.sun_threshold)
-        parts += _describe_tree(world.node_tree, node.inputs["Strength"] if node else None)
+        parts += _describe_tree(world.node_tree, surface.driven())
+        if surface.mapping is not None:
+            parts.append(["turned", surface.mapping.name])
     text = json.dumps(parts, default=str)
     return hashlib.blake2b(text.encode(), digest_size=12).hexdigest()
 
@@ -173,7 +237,7 @@ def is_due(group: bpy.types.ShaderNodeTree, world: bpy.types.World | None) -> bo
 
 
 def _describe_tree(
-    tree: bpy.types.ShaderNodeTree, driven: bpy.types.NodeSocket | None = None
+    tree: bpy.types.ShaderNodeTree, driven: Sequence[bpy.types.NodeSocket] = ()
 ) -> list[object]:
     parts: list[object] = []
     for node in tree.nodes:
@@ -181,7 +245,7 @@ def _describe_tree(
             continue
         parts.append([node.bl_idname, node.name, _describe(node)])
         for socket in node.inputs:
-            if not socket.is_linked and hasattr(socket, "default_value") and socket != driven:
+            if not socket.is_linked and hasattr(socket, "default_value") and socket not in driven:
                 # What is keyframed would be another at every frame.
                 value = "animated" if _moved(tree, socket) else _plain(socket.default_value)
                 parts.append(value)
@@ -242,12 +306,12 @@ def is_animated(world: bpy.types.World) -> bool:
     if surface.kind in {COLOUR, PLAIN}:
         return False
     tree = world.node_tree
-    strength = surface.node.inputs["Strength"] if surface.node else None
+    driven = surface.driven()
     return any(
         _moved(tree, socket)
         for node in tree.nodes
         for socket in node.inputs
-        if hasattr(socket, "default_value") and not socket.is_linked and socket != strength
+        if hasattr(socket, "default_value") and not socket.is_linked and socket not in driven
     )
 
 
@@ -273,12 +337,14 @@ def world_light(world: bpy.types.World | None, *, again: bool = False) -> WorldL
     node = surface.node.name if surface.node else ""
     if surface.kind in {COLOUR, PLAIN}:
         return WorldLight(world, name, surface.kind, node, uniform((1.0, 1.0, 1.0)))
+    mapping = surface.mapping.name if surface.mapping else ""
     environment = None if again else _known(name)
     if environment is None:
-        environment = capture(world, node)
+        environment = capture(world, node, mapping)
     _captured[name] = environment
     driving = world if surface.kind == SCALED else None
-    return WorldLight(driving, name, surface.kind, node, environment)
+    inverse = surface.mapping is not None and surface.mapping.vector_type == "TEXTURE"
+    return WorldLight(driving, name, surface.kind, node, environment, mapping, inverse)
 
 
 def _known(name: str) -> Environment | None:

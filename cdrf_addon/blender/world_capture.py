@@ -31,12 +31,13 @@ PICTURE_WIDTH = 512
 DIFFUSE_RAY = "Is Diffuse Ray"
 
 
-def capture(world: bpy.types.World, background: str) -> Environment:
+def capture(world: bpy.types.World, background: str, mapping: str = "") -> Environment:
     """Render a world and project it.
 
     Args:
         world: Stays as it is.
         background: Name of the Background node whose strength is a factor of its own, or "".
+        mapping: Name of the Mapping node whose rotation is left to the shader, or "".
 
     Raises:
         SceneError: Cycles is switched off, or another render is running.
@@ -46,6 +47,8 @@ def capture(world: bpy.types.World, background: str) -> Environment:
         if background:
             socket = copy.node_tree.nodes[background].inputs["Strength"]
             strength, socket.default_value = socket.default_value, 1.0
+        if mapping:
+            copy.node_tree.nodes[mapping].inputs["Rotation"].default_value = (0.0, 0.0, 0.0)
         with _stage(copy) as scene:
             picture = _render(scene)
     # The threshold is one of the world as it shines now.

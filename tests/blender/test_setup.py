@@ -22,6 +22,14 @@ def attribute(mesh: bpy.types.Mesh) -> np.ndarray:
     return values.reshape(-1, 4)
 
 
+def reasons(item: bpy.types.Object) -> str:
+    from cdrf_addon.blender.state import reasons_to_update
+
+    bpy.context.view_layer.update()
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    return " ".join(reasons_to_update(item, scene, layer))
+
+
 def torus(major: float = 1.0, minor: float = 0.25) -> bpy.types.Object:
     bpy.ops.mesh.primitive_torus_add(
         major_radius=major, minor_radius=minor, major_segments=96, minor_segments=48
@@ -229,11 +237,16 @@ def test_two_objects_share_a_mesh(rig: Rig) -> None:
     first.select_set(True)
     bpy.ops.cdrf.setup()
     assert cdrf_node(first).node_tree[ids.SOURCE_KEY] == "attribute"
-    # Another size of the same shape is corrected per object ...
+    # Another size of the same shape is corrected where it is seen ...
     second.scale = (2.0, 2.0, 2.0)
     bpy.ops.cdrf.update()
     assert cdrf_node(first).node_tree[ids.SOURCE_KEY] == "scaled attribute"
-    assert sorted((first[ids.SCALE_KEY], second[ids.SCALE_KEY])) == pytest.approx([0.5, 1.0])
+    assert (first[ids.SCALE_KEY], second[ids.SCALE_KEY]) == pytest.approx((1.0, 1.0))
+    assert reasons(second) == ""
+    second.scale = (3.0, 3.0, 3.0)
+    assert reasons(second) == ""
+    second.scale = (3.0, 3.0, 2.0)
+    assert "scaled" in reasons(second)
     # ... and another shape is refused.
     second.scale = (2.0, 1.0, 1.0)
     refuses(bpy.ops.cdrf.update, "share a mesh", "single-user")

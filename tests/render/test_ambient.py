@@ -283,3 +283,87 @@ def test_occlusion_darkens_a_corner_and_is_absent_otherwise(rig: Rig) -> None:
     assert bpy.ops.cdrf.update() == {"FINISHED"} and material.cdrf.ambient_occlusion
     material.cdrf.ambient_occlusion = False
     assert "ShaderNodeAmbientOcclusion" not in kinds(floor)
+
+
+def hazy(height: int = 128, width: int = 256) -> np.ndarray:
+    """A sky of several colours with a sun in haze: as smooth as its pixels, wherever they lie."""
+    d = panorama_directions(height, width)
+    axis = np.array([-0.6, 0.5, 0.6]) / np.linalg.norm((-0.6, 0.5, 0.6))
+    sky = 0.4 + 0.2 * d * (1.0, -1.0, 0.7) + 0.1 * (d[..., :1] * d[..., 2:])
+    return sky + np.exp(40.0 * (d @ axis - 1.0))[..., None] * (20.0, 18.0, 14.0)
+
+
+def mapped(rig: Rig, *, kind: str = "POINT") -> bpy.types.ShaderNode:
+    """Put Texture Coordinate -> Mapping before the world's picture."""
+    tree = rig.scene.world.node_tree
+    start, turn = (tree.nodes.new(f"ShaderNode{name}") for name in ("TexCoord", "Mapping"))
+    turn.name, turn.vector_type = 'The "Turn"', kind
+    tree.links.new(start.outputs["Generated"], turn.inputs["Vector"])
+    tree.links.new(turn.outputs["Vector"], tree.nodes["HDRI"].inputs["Vector"])
+    return turn
+
+
+@pytest.mark.parametrize("kind", [pytest.param("POINT", marks=pytest.mark.smoke), "TEXTURE"])
+def test_a_turned_picture_is_followed(rig: Rig, kind: str) -> None:
+    """As a fresh Update sees the same world where the pattern is hidden behind another node.
+
+    Cycles looks at the picture with eight samples for each pixel, so the picture must be smooth.
+    """
+    rig.scene.render.resolution_x = rig.scene.render.resolution_y = 32
+    picture(rig, hazy())
+    turn = mapped(rig, kind=kind)
+    turn.inputs["Rotation"].default_value = (0.1, 0.2, 0.3)
+    ball = white(rig)
+    ball.data.materials[0].cdrf.sigma0 = 0.2
+    light = world.stamped(cdrf_node(ball).node_tree)
+    assert light is not None and light.mapping == turn.name and light.environment.sun is not None
+    for frame, angles in ((1, (0.0, 0.0, 0.0)), (3, (0.8, -1.4, 4.4))):
+        turn.inputs["Rotation"].default_value = angles
+        turn.inputs["Rotation"].keyframe_insert("default_value", frame=frame)
+    rig.scene.frame_set(2)
+    assert turn.inputs["Rotation"].default_value[2] == pytest.approx(2.2)
+    assert due(rig, ball) == [] and not world.is_animated(rig.scene.world)
+    group = cdrf_node(ball).node_tree
+    assert all(curve.driver.is_simple_expression for curve in group.animation_data.drivers)
+    followed = rig.render()
+    covered = followed[..., 3] > 0.999
+
+    tree = rig.scene.world.node_tree
+    same = tree.nodes.new("ShaderNodeVectorMath")
+    tree.links.new(turn.outputs["Vector"], same.inputs[0])
+    tree.links.new(same.outputs["Vector"], tree.nodes["HDRI"].inputs["Vector"])
+    assert any("world" in line for line in due(rig, ball))
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+    light = world.stamped(cdrf_node(ball).node_tree)
+    assert light is not None and not light.mapping
+    assert "ShaderNodeMapping" not in kinds(ball)
+    fresh = rig.render()
+    peak = fresh[covered][:, :3].max()
+    off = np.abs(followed - fresh)[covered][:, :3] / peak
+    print(
+        f"{kind}: worst {off.max():.1e}, RMS {np.sqrt((off**2).mean()):.1e} of the peak {peak:.2f}"
+    )
+    assert off.max() <= 1e-3
+
+
+def test_only_a_picture_that_is_merely_turned_is_followed(rig: Rig) -> None:
+    picture(rig, sunny(64, 128))
+    turn = mapped(rig)
+    ball = white(rig)
+
+    def follows() -> bool:
+        assert bpy.ops.cdrf.update() == {"FINISHED"}
+        return "ShaderNodeMapping" in kinds(ball)
+
+    assert follows()
+    turn.inputs["Scale"].default_value = (1.0, 1.0, -1.0)
+    assert any("world" in line for line in due(rig, ball)) and not follows()
+    turn.inputs["Scale"].default_value = (1.0, 1.0, 1.0)
+    turn.inputs["Location"].default_value = (0.0, 0.0, 0.5)
+    assert not follows()
+    turn.inputs["Location"].default_value = (0.0, 0.0, 0.0)
+    assert follows()
+    turn.vector_type = "VECTOR"
+    assert follows()
+    turn.mute = True
+    assert not follows()

@@ -93,6 +93,14 @@ CASES: dict[str, dict[str, Any]] = {
         "size": 1.0,
         "scale": (-1.0, 1.0, 1.0),
     },
+    "spot of a lamp turned inside out": {
+        "kind": "SPOT",
+        "energy": 300.0,
+        "spot_size": 0.6,
+        "spot_blend": 0.3,
+        "scale": (-2.0, -1.0, -1.0),
+        "rotation": tuple((-Vector(PLACE)).to_track_quat("Z", "Y").to_euler()),
+    },
     "square with a spread, which EEVEE does not heed": {
         "kind": "AREA",
         "energy": 300.0,

@@ -13,6 +13,7 @@ from rig import Rig, cdrf_node
 from tolerances import WRITTEN
 
 from cdrf_addon import ids
+from cdrf_addon.core.heat_kernel import sphere_reflectance
 
 ODD_LIGHTS: dict[str, dict[str, Any]] = {
     "at the centre": {"kind": "POINT", "energy": 10.0},
@@ -90,8 +91,6 @@ def test_odd_lights_give_finite_pixels(rig: Rig, shadows: str) -> None:
 
 
 def test_sixty_four_suns_are_as_good_as_one(rig: Rig) -> None:
-    from cdrf_addon.core.heat_kernel import sphere_reflectance
-
     rig.scene.render.resolution_x = rig.scene.render.resolution_y = 64
     turn = (1.2, 0.0, 0.5)
     for number in range(64):
@@ -103,6 +102,25 @@ def test_sixty_four_suns_are_as_good_as_one(rig: Rig) -> None:
     cosine = normals[covered] @ np.array(bpy.data.objects["Sun 0"].matrix_world)[:3, 2]
     wanted = sphere_reflectance(np.arccos(np.clip(cosine, -1.0, 1.0)), 0.3)
     assert np.abs(picture[covered][:, 0] - wanted).max() <= WRITTEN.worst
+
+
+def test_a_negative_sun_of_a_lamp_turned_inside_out_takes_light_away(rig: Rig) -> None:
+    rig.scene.render.resolution_x = rig.scene.render.resolution_y = 64
+    turn = (1.2, 0.0, 0.5)
+    plus = rig.light("SUN", energy=math.pi, angle=0.0, rotation=turn)
+    minus = rig.light("SUN", energy=-0.3 * math.pi, angle=0.0, rotation=(0.9, 0.0, 2.9))
+    minus.scale = (-1.0, -1.0, -1.0)
+    ball = white_ball(rig)
+    ball.data.materials[0].cdrf.sigma0 = 0.3
+    picture = rig.render()
+    normals, covered = rig.normals(ball)
+    wanted = np.zeros(covered.sum())
+    for sun, power in ((plus, 1.0), (minus, -0.3)):
+        cosine = normals[covered] @ np.array(sun.matrix_world)[:3, 2]
+        wanted += power * sphere_reflectance(np.arccos(np.clip(cosine, -1.0, 1.0)), 0.3)
+    assert wanted.min() < -0.1  # there is nothing darker than black
+    off = picture[covered][:, 0] - np.maximum(wanted, 0.0)
+    assert np.abs(off).max() <= WRITTEN.worst
 
 
 @pytest.mark.smoke
@@ -123,11 +141,19 @@ def test_curvature_that_is_not_a_number(rig: Rig) -> None:
 
 def test_curvature_at_its_ends(rig: Rig) -> None:
     """No curvature is Lambert; without end it is the mean over the sphere, 1/4."""
+    rig.scene.render.resolution_x = rig.scene.render.resolution_y = 48
     sun = rig.light("SUN", energy=math.pi, angle=0.0, rotation=(1.2, 0.0, 0.5))
     ball = white_ball(rig)
-    ball.data.materials[0].cdrf.sigma0 = 1.0
     normals, covered = rig.normals(ball)
     lambert = np.maximum(normals[covered] @ np.array(sun.matrix_world)[:3, 2], 0.0)
-    for kappa, wanted in ((0.0, lambert), (1e6, np.full_like(lambert, 0.25))):
+    mean = np.full_like(lambert, 0.25)
+    for sigma0, kappa, wanted in (
+        (1.0, 0.0, lambert),
+        (1e4, 0.0, lambert),
+        (0.0, 1e6, lambert),
+        (1.0, 1e6, mean),
+        (1e4, 1.0, mean),
+    ):
+        ball.data.materials[0].cdrf.sigma0 = sigma0
         cdrf_node(ball).inputs[ids.CURVATURE].default_value = kappa
         assert np.abs(rig.render()[covered][:, 0] - wanted).max() <= WRITTEN.worst

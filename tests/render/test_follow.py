@@ -8,6 +8,7 @@ import subprocess
 import sys
 import textwrap
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import bpy
@@ -16,6 +17,7 @@ import pytest
 from rig import Rig, cdrf_node
 from tolerances import WRITTEN
 
+from cdrf_addon import ids
 from cdrf_addon.core.heat_kernel import sphere_reflectance
 
 SIGMA = 0.3
@@ -104,7 +106,7 @@ def test_keyframed_sigma0_plays(lit: Lit) -> None:
     assert_lit_from(lit, axis_of(lit.sun))
 
 
-def test_moved_point_light(rig: Rig) -> None:
+def test_moved_recoloured_and_stronger_point_light(rig: Rig) -> None:
     lamp = rig.light("POINT", energy=1.0, location=(0.0, -3.0, 0.0))
     ball = rig.sphere()
     bpy.ops.cdrf.setup()
@@ -115,11 +117,12 @@ def test_moved_point_light(rig: Rig) -> None:
     lamp.location = (2.0, -1.0, 1.0)
     lamp.data.energy = 4.0 * math.pi**2 * 6.0
     lamp.data.use_custom_distance, lamp.data.cutoff_distance = True, 1e3
+    lamp.data.color = colour = (1.0, 0.5, 0.25)
     to_light = np.array(lamp.location) - point[covered]
     distance = np.linalg.norm(to_light, axis=1)
     cosine = (normal[covered] * to_light).sum(axis=1) / distance
     expected = 6.0 / distance**2 * sphere_reflectance(np.arccos(np.clip(cosine, -1.0, 1.0)), SIGMA)
-    error = rig.render()[covered][:, 0] - expected
+    error = rig.render()[covered][:, :3] - expected[:, None] * colour
     assert np.abs(error).max() <= WRITTEN.worst * expected.max()
 
 
@@ -181,3 +184,85 @@ def test_appended_material_brings_its_lights(lit: Lit, tmp_path: Path) -> None:
     bpy.context.view_layer.update()
     assert np.allclose(axis_of(lamp), direction, atol=1e-6)
     assert np.abs(fresh.render() - here).max() <= WRITTEN.worst
+
+
+RENDER_FRAMES = textwrap.dedent(
+    """
+    import sys
+    import bpy
+    assert not bpy.context.preferences.filepaths.use_scripts_auto_execute
+    bpy.ops.wm.open_mainfile(filepath=sys.argv[1], use_scripts=False)
+    assert not hasattr(bpy.types.Material, "cdrf")
+    bpy.context.scene.render.filepath = sys.argv[2]
+    bpy.ops.render.render(animation=True)
+    """
+)
+
+
+def stage_of_moving_lights(rig: Rig) -> None:
+    """Four kinds of light; parented, constrained and animated, in ways that add up."""
+    rig.scene.frame_start, rig.scene.frame_end = 1, 3
+    carousel = rig.link(None)
+    for frame in (1, 3):
+        carousel.rotation_euler = (0.2, 0.1, 0.8 * frame)
+        carousel.keyframe_insert("rotation_euler", frame=frame)
+    target = rig.link(None, location=(0.3, 0.0, 0.2))
+    for frame in (1, 3):
+        target.location.x = 0.4 * frame - 0.8
+        target.keyframe_insert("location", frame=frame)
+
+    sun = rig.light("SUN", name="Key", energy=1.0, angle=0.0, rotation=(1.0, 0.0, 0.4))
+    sun.parent = carousel
+    sun.scale = (2.0, 2.0, 2.0)
+    spot = rig.light("SPOT", name="Spot", energy=150.0, location=(-2.0, -2.5, 1.0))
+    spot.parent = carousel
+    spot.data.spot_size = 0.8
+    aim = spot.constraints.new("TRACK_TO")
+    aim.target, aim.track_axis, aim.up_axis = target, "TRACK_NEGATIVE_Z", "UP_Y"
+    point = rig.light("POINT", name="Point", energy=40.0, location=(0.0, -2.0, -1.5))
+    follow = point.constraints.new("COPY_LOCATION")
+    follow.target, follow.use_offset = target, True
+    area = rig.light("AREA", name="Area", energy=60.0, location=(2.0, -2.0, 0.0), shape="DISK")
+    turn = area.constraints.new("DAMPED_TRACK")
+    turn.target, turn.track_axis = target, "TRACK_NEGATIVE_Z"
+    for frame in (1, 3):
+        point.data.color = (1.0, 0.3 * frame, 0.1)
+        point.data.keyframe_insert("color", frame=frame)
+        area.data.size = 0.2 * frame
+        area.data.keyframe_insert("size", frame=frame)
+        spot.data.energy = 100.0 * frame
+        spot.data.keyframe_insert("energy", frame=frame)
+    flicker = sun.data.driver_add("energy").driver
+    variable = flicker.variables.new()
+    variable.name, variable.type = "x", "TRANSFORMS"
+    variable.targets[0].id = target
+    flicker.expression = "1 + x"
+
+
+@pytest.mark.smoke
+def test_moving_mixed_lights_are_the_same_without_the_extension(rig: Rig, tmp_path: Path) -> None:
+    """Three frames rendered here and in a Blender that knows nothing of CDRF, Auto-Run off."""
+    rig.scene.render.resolution_x = rig.scene.render.resolution_y = 64
+    stage_of_moving_lights(rig)
+    ball = rig.sphere()
+    bpy.context.view_layer.update()
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    ball.data.materials[0].cdrf.sigma0 = SIGMA
+    file = tmp_path / "moving.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=True)
+    script = tmp_path / "elsewhere.py"
+    script.write_text(RENDER_FRAMES)
+    command = [sys.executable, str(script), str(file), str(tmp_path / "frame")]
+    subprocess.run(command, check=True, timeout=300, cwd=tmp_path)
+    seen = []
+    for frame in (1, 2, 3):
+        rig.scene.frame_set(frame)
+        here = rig.render()
+        image = bpy.data.images.load(str(tmp_path / f"frame{frame:04d}.exr"))
+        there = np.array(image.pixels).reshape(here.shape)
+        assert np.abs(here - there).max() <= 1e-6
+        seen.append(here[..., :3])
+    # Every frame differs from the one before, and no light has come to rest.
+    assert all(np.abs(b - a).max() > 0.1 for a, b in pairwise(seen))
+    group = cdrf_node(ball).node_tree
+    assert sum(ids.LIGHT_KEY in node for node in group.nodes) == 4

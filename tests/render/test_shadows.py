@@ -13,7 +13,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from numpy.typing import NDArray
 from rig import RESOLUTION, Rig, cdrf_node
-from tolerances import SHADOW, SHADOW_OF_MANY, SHADOW_WORLD
+from tolerances import SHADOW, SHADOW_OF_HAT, SHADOW_OF_MANY, SHADOW_WORLD
 
 from cdrf_addon import ids
 from cdrf_addon.blender import state
@@ -30,18 +30,23 @@ EDGE = 0.06
 Array = NDArray[np.float64]
 
 
-def directions(count: int) -> Array:
-    found = np.array(SUNS[:count])
+def directions(count: int, suns: Sequence[Sequence[float]] = SUNS) -> Array:
+    found = np.array(suns[:count])
     return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
-def scene_of(rig: Rig, count: int) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """A unit sphere under suns of one half, one third ... and a bar in the way of the first."""
+def light_from(rig: Rig, towards: Array) -> None:
+    """Suns of one half, one third ..., hard, with shadows."""
     rig.camera.data.ortho_scale = SCALE
-    for number, direction in enumerate(directions(count)):
+    for number, direction in enumerate(towards):
         turn = Vector(direction).to_track_quat("Z", "Y").to_euler()
         sun = rig.light("SUN", energy=math.pi / (number + 2), angle=0.0, rotation=turn)
         sun.data.use_shadow = True
+
+
+def scene_of(rig: Rig, count: int) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """A unit sphere under the first SUNS, and a bar in the way of the first."""
+    light_from(rig, directions(count))
     toward = Vector(directions(1)[0])
     bpy.ops.mesh.primitive_cube_add(size=1.0, location=1.35 * toward)
     bar = bpy.context.object
@@ -78,27 +83,29 @@ def blocked(bar: bpy.types.Object, places: Array, direction: Array) -> NDArray[n
     return np.array([tree.ray_cast(Vector(place), toward)[0] is not None for place in places])
 
 
-def expected(bar: bpy.types.Object, count: int) -> tuple[Array, NDArray[np.bool_]]:
+def expected(
+    bar: bpy.types.Object, towards: Array, sigma: float = SIGMA, edge: float = EDGE
+) -> tuple[Array, NDArray[np.bool_]]:
     """What theory shows, and the pixels clear of every edge."""
     places, clear = points()
     flat = places.reshape(-1, 3)
     shown = np.zeros(len(flat))
-    for number, direction in enumerate(directions(count)):
+    for number, direction in enumerate(towards):
         cosine = flat @ direction
-        light = sphere_reflectance(np.arccos(np.clip(cosine, -1.0, 1.0)), SIGMA) / (number + 2)
+        light = sphere_reflectance(np.arccos(np.clip(cosine, -1.0, 1.0)), sigma) / (number + 2)
         side = np.cross(direction, (0.0, 0.0, 1.0))
         side /= np.linalg.norm(side)
         up = np.cross(side, direction)
         shadow = blocked(bar, flat, direction)
         for step in (side, -side, up, -up):
-            same = blocked(bar, flat + EDGE * step, direction) == shadow
+            same = blocked(bar, flat + edge * step, direction) == shadow
             clear &= same.reshape(clear.shape)
         shown += np.where(shadow, 0.0, light)
     return shown.reshape(clear.shape), clear
 
 
 def errors(rig: Rig, bar: bpy.types.Object, count: int, world: float = 0.0) -> Array:
-    wanted, clear = expected(bar, count)
+    wanted, clear = expected(bar, directions(count))
     picture = rig.render()[..., 0] - world
     off = np.abs(picture - wanted)[clear]
     print(f"{count} lights: worst {off.max():.2e}, RMS {np.sqrt((off**2).mean()):.2e}")
@@ -137,6 +144,103 @@ def test_the_world_does_not_brighten_a_shadow(rig: Rig) -> None:
     assert np.sqrt((off**2).mean()) <= SHADOW_WORLD.rms
 
 
+# Hats are worn in the sun: the key and the second from above, the third from below the brim.
+HAT_SUNS = ((0.4, -0.65, 0.65), (-0.6, -0.6, 0.5), (0.75, -0.6, -0.2))
+BRIM = 0.6
+HAT_SIGMA = 0.1
+HAT_EDGE = 0.14
+"""Shadows under a brim fall at a grazing angle: EEVEE's own, on a Diffuse BSDF, fray as far."""
+
+
+def bald_head(rig: Rig, count: int) -> bpy.types.Object:
+    """A unit sphere under the first HAT_SUNS, translucent before it has a hat."""
+    light_from(rig, directions(count, HAT_SUNS))
+    head = rig.sphere(subdivisions=6)
+    bpy.context.view_layer.update()
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    material = head.data.materials[0]
+    material.cdrf.shadow_edges = False
+    material.cdrf.sigma0 = HAT_SIGMA
+    cdrf_node(head).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
+    return head
+
+
+def hat() -> bpy.types.Object:
+    """The brim of a straw hat, flat, on the sphere's forehead."""
+    bpy.ops.mesh.primitive_cylinder_add(
+        vertices=96, radius=1.35, depth=0.03, location=(0.0, 0.0, BRIM)
+    )
+    bpy.context.view_layer.update()
+    return bpy.context.object
+
+
+def below_the_brim(rig: Rig, brim: bpy.types.Object, count: int, *, shadow: bool = True) -> Array:
+    """Differences from theory over the skin that the camera sees under the hat."""
+    towards = directions(count, HAT_SUNS)
+    wanted, clear = expected(brim, towards, HAT_SIGMA, HAT_EDGE)
+    places, _ = points()
+    if not shadow:
+        places, clear = points()
+        cosine = np.clip(places @ towards[0], -1.0, 1.0)
+        wanted = 0.5 * sphere_reflectance(np.arccos(cosine), HAT_SIGMA)
+    clear &= places[..., 2] < BRIM - 0.1
+    off = np.abs(rig.render()[..., 0] - wanted)[clear]
+    print(f"worst {off.max():.2e}, RMS {np.sqrt((off**2).mean()):.2e}, {clear.sum()} pixels")
+    return off
+
+
+@pytest.mark.parametrize("count", [pytest.param(1, marks=pytest.mark.smoke), 3])
+def test_a_hat_is_noticed_and_shades_the_face(rig: Rig, count: int) -> None:
+    head = bald_head(rig, count)
+    assert shadow_nodes(head) == 0 and reasons(head) == ""
+    brim = hat()
+    assert "can cast one is new" in reasons(head)
+    assert bpy.ops.cdrf.update() == {"FINISHED"} and reasons(head) == ""
+    off = below_the_brim(rig, brim, count)
+    assert off.max() <= SHADOW_OF_HAT.worst
+    assert np.sqrt((off**2).mean()) <= SHADOW_OF_HAT.rms
+    # A hat that is taken off is followed at once.
+    brim.location.y += 200.0
+    bpy.context.view_layer.update()
+    bare = below_the_brim(rig, brim, count)
+    assert bare.max() <= SHADOW_OF_HAT.worst
+    assert np.sqrt((bare**2).mean()) <= SHADOW.rms
+
+
+def test_what_the_camera_does_not_see_may_shade(rig: Rig) -> None:
+    """Holdouts and shadow-only objects shade; what casts no shadow needs no shadow nodes."""
+    head = bald_head(rig, 1)
+    brim = hat()
+    for setting, value, shades in (
+        ("is_holdout", True, True),
+        ("visible_camera", False, True),
+        ("visible_shadow", False, False),
+        ("hide_render", True, False),
+    ):
+        before = getattr(brim, setting)
+        setattr(brim, setting, value)
+        bpy.context.view_layer.update()
+        assert bpy.ops.cdrf.update() == {"FINISHED"}
+        assert (shadow_nodes(head) > 0) == shades
+        worst = below_the_brim(rig, brim, 1, shadow=shades).max()
+        assert worst <= (SHADOW_OF_HAT if shades else SHADOW).worst
+        setattr(brim, setting, before)
+
+
+def test_a_hat_in_a_collection_instance_shades(rig: Rig) -> None:
+    head = bald_head(rig, 1)
+    brim = hat()
+    wardrobe = bpy.data.collections.new("Wardrobe")
+    wardrobe.objects.link(brim)
+    rig.scene.collection.objects.unlink(brim)
+    assert reasons(head) == ""
+    worn = rig.link(None)
+    worn.instance_type, worn.instance_collection = "COLLECTION", wardrobe
+    assert "can cast one is new" in reasons(head)
+    assert bpy.ops.cdrf.update() == {"FINISHED"} and shadow_nodes(head) > 0
+    assert below_the_brim(rig, brim, 1).max() <= SHADOW_OF_HAT.worst
+
+
 def shadow_nodes(ball: bpy.types.Object) -> int:
     tree = cdrf_node(ball).node_tree
     return sum(node.name.startswith("Shadow") for node in tree.nodes)
@@ -144,6 +248,7 @@ def shadow_nodes(ball: bpy.types.Object) -> int:
 
 def reasons(ball: bpy.types.Object) -> str:
     context = bpy.context
+    context.view_layer.update()
     return " ".join(state.reasons_to_update(ball, context.scene, context.view_layer))
 
 

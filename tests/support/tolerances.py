@@ -44,6 +44,11 @@ SHADOW = Bound(
     "clear of edges, in a peak of 1/2: EEVEE's horizon table leaves 0.8 % of a light in the plane "
     "where another is measured; bleeding beyond 5 sigma0 is cut",
 )
+SHADOW_OF_HAT = Bound(
+    2e-2,
+    2e-3,
+    "behind the terminator an occluder nearer than 5 sigma0 is skipped, and with it 0.016 of light",
+)
 SHADOW_OF_MANY = Bound(0.3, 1e-2, "one mask for all lights darkens those that are not blocked")
 SHADOW_WORLD = Bound(
     2e-2, 1e-2, "EEVEE's world light is not quite the even function that is taken off"
