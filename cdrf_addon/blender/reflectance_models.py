@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import bpy
 
@@ -32,9 +33,8 @@ from ..core.models import (
 )
 from ..core.presets import Preset, in_units
 from ..core.scattering import sigma0_per_radius
-from . import shader, world
+from . import linking, shader, world
 from .image import ensure_table, find_table, table_of
-from .lights import SceneLight, scene_lights
 from .materials import cdrf_node, install, require_editable
 from .read_material import Scattering
 from .shadows import Choice, choose
@@ -264,12 +264,17 @@ def change_variant(
         mapped=now.mapped,
         occluded=now.occluded if occluded is None else occluded,
         shadows=now.shadows if shadows is None else shadows,
+        links=now.links,
     )
-    where = scene_of_group(node.node_tree)
-    if wanted != now and where is not None:
+    scene = _scene(node.node_tree)
+    layer = _view_layer(node.node_tree)
+    if wanted != now and scene is not None and layer is not None:
+        lights = linking.material_lights(material, scene, layer)
+        wanted = replace(wanted, links=linking.links_of(lights))
         # The world's light as it was at the last Update: a slider must not render anything.
         light = world.stamped(node.node_tree)
-        install(material, shader.ensure_shader_group(wanted, *where, light))
+        install(material, shader.ensure_shader_group(wanted, scene, lights, light))
+        linking.write_unlit()
 
 
 def refresh_shadows(material: bpy.types.Material) -> None:
@@ -282,18 +287,13 @@ def refresh_shadows(material: bpy.types.Material) -> None:
         change_variant(material, shadows=choose(material, layer))
 
 
+def _scene(group: bpy.types.ShaderNodeTree) -> bpy.types.Scene | None:
+    """Return the scene a shader group was made for; the open one if it is gone."""
+    return bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
+
+
 def _view_layer(group: bpy.types.ShaderNodeTree) -> bpy.types.ViewLayer | None:
-    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
+    scene = _scene(group)
     if scene is None or bpy.context.scene == scene:
         return bpy.context.view_layer
     return scene.view_layers[0]
-
-
-def scene_of_group(
-    group: bpy.types.ShaderNodeTree,
-) -> tuple[bpy.types.Scene, list[SceneLight]] | None:
-    """Return the scene a shader group was made for and its lights; the open one if it is gone."""
-    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
-    if scene is None:
-        return None
-    return scene, scene_lights(scene, _view_layer(group))
