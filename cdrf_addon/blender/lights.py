@@ -329,8 +329,8 @@ def drive(
         curve.modifiers.remove(modifier)
     driver = curve.driver
     driver.type = "SCRIPTED"
-    for name, path in paths.items():
-        owner, where = (source, path) if isinstance(path, str) else path
+    for name, given in paths.items():
+        owner, where = given if isinstance(given, tuple) else (source, given)
         variable = driver.variables.new()
         variable.name = name
         if where.startswith("scene:"):
