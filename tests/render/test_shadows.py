@@ -155,6 +155,7 @@ def test_shadow_linking(rig: Rig) -> None:
     assert ("block light 'Sun'" in reasons(ball)) == HAS_RAYCAST
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     assert reasons(ball) == ""
+    assert shadow_nodes(ball) == 1  # the mask; its rays would meet the bar
     picture = rig.render()[..., 0]
     bar.location = (50.0, 0.0, 0.0)  # in theory it might as well be far away
     bpy.context.view_layer.update()
