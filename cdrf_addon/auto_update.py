@@ -12,7 +12,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from . import ids
-from .blender import reflectance_models, setup, state
+from .blender import linking, reflectance_models, setup, state
 from .blender.lights import scene_lights
 from .blender.materials import cdrf_node
 from .blender.skin_lights import lights_on_skin
@@ -59,7 +59,9 @@ def _rendering() -> bool:
 
 def _signature(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> tuple[object, ...]:
     lights = scene_lights(scene, layer)
-    return tuple((light.object.session_uid, light.kind, light.casts) for light in lights)
+    return tuple(
+        (light.name, light.object.session_uid, light.kind, light.casts) for light in lights
+    )
 
 
 def _concerns_lights(depsgraph: bpy.types.Depsgraph) -> bool:
@@ -116,7 +118,7 @@ def update_lights(context: bpy.types.Context) -> int:
         node = cdrf_node(skin)
         if node is None or node.node_tree.get(ids.SCENE_KEY) != scene.name:
             continue
-        if state.lights_due(node.node_tree, lights):
+        if state.lights_due(node.node_tree, linking.reaching(lights, skin, layer)):
             reflectance_models.refresh_lights(skin)
             changed += 1
     return changed

@@ -17,6 +17,12 @@ HAS_RAYCAST = bpy.app.version >= (5, 1, 0)
 """Whether shader trees know the Raycast node, which coloured shadow edges need."""
 
 
+INSTANCER_LINKS = bpy.app.version >= (5, 0, 0)
+"""Whether an instance's lights are linked as the instancing empty is, not as they are themselves.
+
+Measured on 4.5 and 5.2."""
+
+
 def set_still_format(settings: bpy.types.ImageFormatSettings, kind: str) -> None:
     """Make renders write single pictures; from 5.0 on a scene may be set to video or layers."""
     if hasattr(settings, "media_type"):

@@ -53,6 +53,18 @@ OCCLUDED_KEY: Final = "cdrf_occluded"
 SCALE_KEY: Final = "cdrf_curvature_scale"
 """On an object, where its mesh is seen in several sizes: length of its X axis as measured."""
 
+INSTANCED_KEY: Final = "cdrf_instanced"
+"""On a light's branch: the light stands in a collection instance."""
+LINKS_KEY: Final = "cdrf_light_links"
+"""On a shader group: the lights with light linking that it has."""
+BIT_KEY: Final = "cdrf_light_bit"
+"""On a light's branch: which bit of an object's UNLIT_KEY takes the light away; -1 for none."""
+UNLIT_KEY: Final = "cdrf_unlit"
+"""On an object: lights it does not receive, as a sum of powers of two. An object without it
+receives all, as an absent property reads as 0."""
+BLOCKERS_KEY: Final = "cdrf_blockers"
+"""On a light's branch: only some objects block the light (shadow linking)."""
+
 SHADOW_KEY: Final = "cdrf_shadow"
 """On a light's branch: it casts shadows. On a shader group: its lights' shadows are wired."""
 EDGE_KEY: Final = "cdrf_shadow_edges"

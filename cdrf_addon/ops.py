@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from . import ids
-from .blender import display, legend, materials, reflectance_models, state, viewport
+from .blender import display, legend, linking, materials, reflectance_models, state, viewport
 from .blender.mesh_io import remove_curvature
 from .blender.setup import (
     Report,
@@ -197,6 +197,7 @@ class CDRF_OT_remove(bpy.types.Operator):
                 item.data.cdrf.fingerprint = ""
                 if ids.SCALE_KEY in item:
                     del item[ids.SCALE_KEY]
+        linking.write_unlit()
         reflectance_models.remove_unused()
         self.report({"INFO"}, f"CDRF: {len(chosen)} material(s) as before")
         return {"FINISHED"}

@@ -28,7 +28,7 @@ from ..core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS
 from .image import Table
 from .nodetree import TreeBuilder, declare, ensure_group
 
-VERSION = 8
+VERSION = 9
 
 ELLIPTIC = {"DISK", "ELLIPSE"}
 
@@ -38,6 +38,9 @@ SEPARATE = CHANNEL_SETS[-1]
 PARTS = {"R": "Red", "G": "Green", "B": "Blue"}
 
 SOFT_RADIUS2 = 1e-6  # EEVEE treats a point light as a sphere of at least 1 mm
+# A spot light with an axis scaled to less than the root of this is dark: at 1e-7 it shines, at 1e-8
+# no more. A sun is dark only where its Z axis is scaled to nothing at all.
+LEAST_SPOT_AXIS2 = 1e-15
 
 
 def reflectance_group(
@@ -201,8 +204,11 @@ def sun_group() -> bpy.types.ShaderNodeTree:
         declare(b.tree, ids.SIN2_HALF_ANGLE, low=0.0, high=1.0)
         given, result = b.ends()
         variance, gain = _finite(b, given[ids.SIN2_HALF_ANGLE], given[ids.GAIN])
+        # A blurred terminator is not black, so a sun without a direction must be.
+        length2 = b.vector("DOT_PRODUCT", given[ids.AXIS_Z], given[ids.AXIS_Z])
+        amount = b.math("MULTIPLY", gain, b.math("GREATER_THAN", length2, 0.0))
         b.feed(result[ids.DIRECTION], b.vector("NORMALIZE", given[ids.AXIS_Z]))
-        b.feed(result[ids.RADIANCE], b.vector("SCALE", given[ids.POWER], scale=gain))
+        b.feed(result[ids.RADIANCE], b.vector("SCALE", given[ids.POWER], scale=amount))
         b.feed(result[ids.VARIANCE], variance)
 
     return ensure_group("CDRF Sun", "light SUN", VERSION, build)
@@ -237,6 +243,7 @@ def spot_group() -> bpy.types.ShaderNodeTree:
 
     With x, y, z the direction in the lamp's frame, its axes scaled as the lamp is:
         mask = smoothstep((1 / sqrt(1 + (x/z)^2 + (y/z)^2) - cone cosine) * sharpness),  z > 0
+    and 0 where an axis is scaled to zero.
     """
 
     def build(b: TreeBuilder) -> None:
@@ -261,18 +268,21 @@ def spot_group() -> bpy.types.ShaderNodeTree:
         ).outputs
         direction = point[ids.DIRECTION]
 
-        def along(axis: Any) -> Any:
-            # Component over length: dot(L, A) / |A|^2; Blender's division by zero is zero.
-            length2 = b.vector("DOT_PRODUCT", axis, axis)
-            return b.math("DIVIDE", b.vector("DOT_PRODUCT", direction, axis), length2)
-
-        x, y, z = (along(given[axis]) for axis in (ids.AXIS_X, ids.AXIS_Y, ids.AXIS_Z))
+        axes = [given[axis] for axis in (ids.AXIS_X, ids.AXIS_Y, ids.AXIS_Z)]
+        lengths2 = [b.vector("DOT_PRODUCT", axis, axis) for axis in axes]
+        # Component over length: dot(L, A) / |A|^2; Blender's division by zero is zero.
+        x, y, z = (
+            b.math("DIVIDE", b.vector("DOT_PRODUCT", direction, axis), length2)
+            for axis, length2 in zip(axes, lengths2, strict=True)
+        )
         across = b.combine(b.math("DIVIDE", x, z), b.math("DIVIDE", y, z), 0.0)
         cosine = b.math("INVERSE_SQRT", b.math("ADD", 1.0, b.vector("DOT_PRODUCT", across, across)))
         inside = b.math("SUBTRACT", cosine, given[ids.CONE_COSINE])
         t = b.math("MULTIPLY", inside, given[ids.CONE_SHARPNESS], clamp=True)
         smooth = b.math("MULTIPLY", b.math("MULTIPLY", t, t), b.math("MULTIPLY_ADD", t, -2.0, 3.0))
         mask = b.math("MULTIPLY", smooth, b.math("GREATER_THAN", z, 0.0))
+        shortest2 = b.math("MINIMUM", b.math("MINIMUM", *lengths2[:2]), lengths2[2])
+        mask = b.math("MULTIPLY", mask, b.math("GREATER_THAN", shortest2, LEAST_SPOT_AXIS2))
         b.feed(result[ids.DIRECTION], direction)
         b.feed(result[ids.RADIANCE], b.vector("SCALE", point[ids.RADIANCE], scale=mask))
         b.feed(result[ids.VARIANCE], point[ids.VARIANCE])
@@ -344,7 +354,9 @@ def area_group(*, elliptic: bool) -> bpy.types.ShaderNodeTree:
         drawn = b.math("GREATER_THAN", product, LEAST_HALF_AXES_PRODUCT)
         world_area = b.math("MULTIPLY", product, axes_to_area)
         variance, gain = _finite(b, b.math("MULTIPLY", magnitude, 1.0 / math.pi), given[ids.GAIN])
-        # Per square metre without Normalize, in all with it: area^-normalize.
+        # Per square metre without Normalize, in all with it: area^-normalize. Of no area that would
+        # be infinite, and nothing times it not a number.
+        world_area = b.math("MAXIMUM", world_area, LEAST_HALF_AXES_PRODUCT)
         density = b.math("POWER", world_area, b.math("MULTIPLY", given[ids.NORMALIZE], -1.0))
         amount = b.math("MULTIPLY", b.math("MULTIPLY", magnitude, density), gain)
         amount = b.math("MULTIPLY", amount, b.math("MULTIPLY", lit, drawn))

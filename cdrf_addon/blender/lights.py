@@ -18,6 +18,10 @@ from dataclasses import dataclass
 import bpy
 
 from .. import ids
+from ..compat import INSTANCER_LINKS
+
+Paths = dict[str, str | tuple[bpy.types.ID, str]]
+"""What each name of a driver's expression stands for; see `drive`."""
 
 AXES = {ids.AXIS_X: 0, ids.AXIS_Y: 1, ids.AXIS_Z: 2, ids.POSITION: 3}
 
@@ -48,6 +52,38 @@ class SceneLight:
     excluded: tuple[str, ...] = ()
     """Where some view layers leave it out: paths, from a view layer, of the Exclude flags of its
     collections. It is dark where all are set."""
+    instance: bpy.types.Object | None = None
+    """The empty that instances the light's collection; None for a light of the scene itself."""
+    selective: bool = False
+    """Whether some objects of a material receive it and others do not (linking.py)."""
+
+    @property
+    def source(self) -> tuple[bpy.types.Object, bpy.types.Object | None]:
+        """What tells it from other lights: the lamp, and the empty that instances it if any."""
+        return self.object, self.instance
+
+    @property
+    def name(self) -> str:
+        """What to call it in the panel."""
+        where = f" in {self.instance.name}" if self.instance is not None else ""
+        return f"{self.object.name}{where}"
+
+    @property
+    def linker(self) -> bpy.types.Object:
+        """The object whose light linking counts for it."""
+        return self.instance if self.instance is not None and INSTANCER_LINKS else self.object
+
+    @property
+    def receivers(self) -> bpy.types.Collection | None:
+        """Collection that says which objects receive it; None if all do."""
+        linking = self.linker.light_linking
+        return linking.receiver_collection if linking is not None else None
+
+    @property
+    def picks_blockers(self) -> bool:
+        """Whether only some objects cast its shadows."""
+        linking = self.linker.light_linking
+        return linking is not None and linking.blocker_collection is not None
 
     @property
     def type(self) -> str:
@@ -82,12 +118,6 @@ def is_black(item: bpy.types.Object) -> bool:
     return bool(dark or max(light.color) <= 0.0)
 
 
-def is_linked_to_some(item: bpy.types.Object) -> bool:
-    """Tell whether a light is limited to the objects of a collection (light linking)."""
-    linking = getattr(item, "light_linking", None)
-    return linking is not None and linking.receiver_collection is not None
-
-
 def casts_shadow(light: bpy.types.Light) -> bool:
     """Tell whether a light casts shadows, or may come to by animation."""
     return bool(light.use_shadow) or light.animation_data is not None
@@ -97,20 +127,65 @@ def scene_lights(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> lis
     """List the lights that a render of this view layer would use, by name.
 
     A light that is switched off for renders is left out, unless its visibility is animated, and
-    so is one that is black and cannot change by itself.
+    so is one that is black and cannot change by itself. A light in a collection that an empty
+    instances is one for each such empty.
     """
-    shown = _render_visible(view_layer.layer_collection)
     found = []
-    for item in view_layer.objects:
-        if item.type != "LIGHT" or item.name not in shown:
-            continue
-        if item.hide_render and not _animates(item, "hide_render"):
-            continue
-        if is_black(item):
-            continue
-        light = item.data
-        found.append(SceneLight(item, kind_of(light), is_soft(item), casts_shadow(light)))
-    return sorted(found, key=lambda light: light.object.name)
+    for item in _rendered(view_layer):
+        if item.type == "LIGHT" and not is_black(item):
+            found.append(_scene_light(item))
+        elif is_instance(item):
+            inside = _rendered_in(item.instance_collection)
+            found += [
+                _scene_light(lamp, item)
+                for lamp in inside
+                if lamp.type == "LIGHT" and not is_black(lamp)
+            ]
+    return sorted(found, key=lambda light: light.name)
+
+
+def nested_instances(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """List the empties whose lights are inside an instance in their instance: too deep for us."""
+    return [
+        item
+        for item in _rendered(view_layer)
+        if is_instance(item)
+        and any(
+            lamp.type == "LIGHT"
+            for part in _rendered_in(item.instance_collection)
+            if is_instance(part)
+            for lamp in part.instance_collection.all_objects
+        )
+    ]
+
+
+def is_instance(item: bpy.types.Object) -> bool:
+    """Tell whether an object is an empty that instances a collection."""
+    return item.instance_type == "COLLECTION" and item.instance_collection is not None
+
+
+def _scene_light(lamp: bpy.types.Object, instance: bpy.types.Object | None = None) -> SceneLight:
+    light = lamp.data
+    return SceneLight(lamp, kind_of(light), is_soft(lamp), casts_shadow(light), instance=instance)
+
+
+def _rendered(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    shown = _render_visible(view_layer.layer_collection)
+    return [item for item in view_layer.objects if item.name in shown and _renders(item)]
+
+
+def _rendered_in(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """List the objects that an instance of a collection shows, each once."""
+    if collection.hide_render:
+        return []
+    found = [item for item in collection.objects if _renders(item)]
+    for child in collection.children:
+        found += _rendered_in(child)
+    return list(dict.fromkeys(found))
+
+
+def _renders(item: bpy.types.Object) -> bool:
+    return not item.hide_render or _animates(item, "hide_render")
 
 
 def _render_visible(layer: bpy.types.LayerCollection) -> set[str]:
@@ -142,8 +217,7 @@ def drive_light(
     for name, column in AXES.items():
         if name in inputs:
             for row in range(3):
-                path = f"matrix_world[{column}][{row}]"
-                drive(tree, inputs[name], lamp, "v", {"v": path}, row)
+                drive(tree, inputs[name], lamp, *_placed(light, column, row), row)
     for channel in range(3):
         expression, paths = _power(light, channel)
         drive(tree, inputs[ids.POWER], lamp, expression, paths, channel)
@@ -151,8 +225,26 @@ def drive_light(
         drive(tree, inputs[name], lamp, expression, paths)
 
 
-def _power(light: SceneLight, channel: int) -> tuple[str, dict[str, str]]:
-    paths = {
+def _placed(light: SceneLight, column: int, row: int) -> tuple[str, Paths]:
+    """A number of the matrix that places the light in the world.
+
+    In an instance that is the empty's matrix times the lamp's, its position taken from the point
+    of the collection that stands in the empty.
+    """
+    empty = light.instance
+    if empty is None:
+        return "v", {"v": f"matrix_world[{column}][{row}]"}
+    paths: Paths = {f"l{k}": f"matrix_world[{column}][{k}]" for k in range(3)}
+    paths |= {f"e{k}": (empty, f"matrix_world[{k}][{row}]") for k in range(3)}
+    if column != AXES[ids.POSITION]:
+        return "e0*l0+e1*l1+e2*l2", paths
+    paths |= {f"o{k}": (empty, f"instance_collection.instance_offset[{k}]") for k in range(3)}
+    paths |= {"e3": (empty, f"matrix_world[3][{row}]")}
+    return "e0*(l0-o0)+e1*(l1-o1)+e2*(l2-o2)+e3", paths
+
+
+def _power(light: SceneLight, channel: int) -> tuple[str, Paths]:
+    paths: Paths = {
         "e": "data.energy",
         "x": "data.exposure",
         "c": f"data.color[{channel}]",
@@ -173,21 +265,24 @@ def _power(light: SceneLight, channel: int) -> tuple[str, dict[str, str]]:
         flags = {f"l{number}": path for number, path in enumerate(light.excluded)}
         paths |= {name: f"layer:{path}" for name, path in flags.items()}
         expression += f"*(1-{'*'.join(flags)})"
+    if light.instance is not None:
+        paths |= {"i": (light.instance, "hide_render")}
+        expression += "*(1-i)"
     return expression, paths
 
 
-def _settings(light: SceneLight) -> dict[str, tuple[str, dict[str, str]]]:
+def _settings(light: SceneLight) -> dict[str, tuple[str, Paths]]:
     if light.type == "SUN":
         # EEVEE's limits: half-angles from 0.001 rad to just under a right angle.
         return {
             ids.SIN2_HALF_ANGLE: ("pow(sin(min(a,3.1398)/2),2)", {"a": "data.angle"}),
         }
-    settings = {ids.INVERSE_RANGE2: _inverse_range2()}
+    settings: dict[str, tuple[str, Paths]] = {ids.INVERSE_RANGE2: _inverse_range2()}
     if light.type in {"POINT", "SPOT"}:
         settings[ids.RADIUS] = ("r", {"r": "data.shadow_soft_size"})
         settings[ids.SOFT_FALLOFF] = ("s", {"s": "data.use_soft_falloff"})
     if light.type == "SPOT":
-        cone = {"s": "data.spot_size"}
+        cone: Paths = {"s": "data.spot_size"}
         settings[ids.CONE_COSINE] = ("cos(s/2)", cone)
         settings[ids.CONE_SHARPNESS] = (
             "1/max(1e-8,(1-cos(s/2))*b)",
@@ -201,9 +296,9 @@ def _settings(light: SceneLight) -> dict[str, tuple[str, dict[str, str]]]:
     return settings
 
 
-def _inverse_range2() -> tuple[str, dict[str, str]]:
+def _inverse_range2() -> tuple[str, Paths]:
     """EEVEE's cut-off: the custom distance, or where the light falls below the threshold."""
-    paths = {
+    paths: Paths = {
         "u": "data.use_custom_distance",
         "k": "data.cutoff_distance",
         "e": "data.energy",
@@ -223,7 +318,7 @@ def drive(
     socket: bpy.types.NodeSocket,
     source: bpy.types.ID,
     expression: str,
-    paths: Mapping[str, str],
+    paths: Mapping[str, str | tuple[bpy.types.ID, str]],
     index: int = -1,
 ) -> None:
     """Drive a socket's default by an expression over properties of `source`.
@@ -233,8 +328,9 @@ def drive(
         socket: An unlinked input; addressed by node and socket name, which survives reordering.
         source: Data the paths start from. A path "scene:..." starts from the active scene.
         expression: Over the names of `paths`, in Blender's Python-free subset.
-        paths: Property path of each name. A path "layer:..." starts from the view layer that is
-            drawn, and counts as 0 where that layer has no such property.
+        paths: Property path of each name; or some other data, and a path that starts from it. A
+            path "layer:..." starts from the view layer that is drawn, and counts as 0 where that
+            layer has no such property.
         index: Component of a vector socket, -1 for a scalar.
     """
     node = bpy.utils.escape_identifier(socket.node.name)
@@ -248,7 +344,8 @@ def drive(
         curve.modifiers.remove(modifier)
     driver = curve.driver
     driver.type = "SCRIPTED"
-    for name, where in paths.items():
+    for name, given in paths.items():
+        owner, where = given if isinstance(given, tuple) else (source, given)
         variable = driver.variables.new()
         variable.name = name
         if where.startswith("scene:"):
@@ -262,8 +359,8 @@ def drive(
             # A collection that was renamed since: the light shines until the next Update.
             variable.targets[0].use_fallback_value = True
         else:
-            variable.targets[0].id_type = source.id_type
-            variable.targets[0].id = source
+            variable.targets[0].id_type = owner.id_type
+            variable.targets[0].id = owner
             variable.targets[0].data_path = where
     driver.expression = expression
     if not driver.is_simple_expression:

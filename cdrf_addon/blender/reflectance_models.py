@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import bpy
 
@@ -32,13 +33,11 @@ from ..core.models import (
 )
 from ..core.presets import Preset, in_units
 from ..core.scattering import sigma0_per_radius
-from . import shader, world
+from . import linking, shader, world
 from .image import ensure_table, find_table, table_of
-from .lights import SceneLight
 from .materials import cdrf_node, install, require_editable
 from .read_material import Scattering
 from .shadows import Choice, choose
-from .skin_lights import lights_on_skin
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -265,12 +264,10 @@ def change_variant(
         mapped=now.mapped,
         occluded=now.occluded if occluded is None else occluded,
         shadows=now.shadows if shadows is None else shadows,
+        links=now.links,
     )
-    where = scene_of_group(node.node_tree)
-    if wanted != now and where is not None:
-        # The world's light as it was at the last Update: a slider must not render anything.
-        light = world.stamped(node.node_tree)
-        install(material, shader.ensure_shader_group(wanted, *where, light))
+    if wanted != now:
+        _install(material, node.node_tree, wanted)
 
 
 def refresh_shadows(material: bpy.types.Material) -> None:
@@ -286,25 +283,32 @@ def refresh_shadows(material: bpy.types.Material) -> None:
 def refresh_lights(material: bpy.types.Material) -> None:
     """Give a translucent material's group the lights that its scene has now."""
     node = cdrf_node(material)
-    where = scene_of_group(node.node_tree) if node is not None else None
-    if node is None or where is None or not material.is_editable:
+    if node is not None and material.is_editable:
+        _install(material, node.node_tree, shader.stamped_variant(node.node_tree))
+
+
+def _install(
+    material: bpy.types.Material, group: bpy.types.ShaderNodeTree, wanted: shader.Variant
+) -> None:
+    """Put the variant of a group, with the lights that its scene has now, in the group's place."""
+    scene, layer = _scene(group), _view_layer(group)
+    if scene is None or layer is None:
         return
-    variant, light = shader.stamped_variant(node.node_tree), world.stamped(node.node_tree)
-    install(material, shader.ensure_shader_group(variant, *where, light))
+    lights = linking.material_lights(material, scene, layer)
+    wanted = replace(wanted, links=linking.links_of(lights))
+    # The world's light as it was at the last Update: a slider must not render anything.
+    light = world.stamped(group)
+    install(material, shader.ensure_shader_group(wanted, scene, lights, light))
+    linking.write_unlit()
+
+
+def _scene(group: bpy.types.ShaderNodeTree) -> bpy.types.Scene | None:
+    """Return the scene a shader group was made for; the open one if it is gone."""
+    return bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
 
 
 def _view_layer(group: bpy.types.ShaderNodeTree) -> bpy.types.ViewLayer | None:
-    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
+    scene = _scene(group)
     if scene is None or bpy.context.scene == scene:
         return bpy.context.view_layer
     return scene.view_layers[0]
-
-
-def scene_of_group(
-    group: bpy.types.ShaderNodeTree,
-) -> tuple[bpy.types.Scene, list[SceneLight]] | None:
-    """Return the scene a shader group was made for and its lights; the open one if it is gone."""
-    scene = bpy.data.scenes.get(group.get(ids.SCENE_KEY, "")) or bpy.context.scene
-    if scene is None:
-        return None
-    return scene, lights_on_skin(scene, _view_layer(group))

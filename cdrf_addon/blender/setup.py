@@ -36,10 +36,10 @@ from ..core.summary import (
     CurvatureSummary,
     summarise,
 )
-from . import display, gloss, reflectance_models, shader, shadows, state, world
+from . import display, gloss, linking, reflectance_models, shader, shadows, state, world
 from .image import adopt_table
 from .instances import shown_objects
-from .lights import SceneLight, is_linked_to_some
+from .lights import SceneLight, nested_instances
 from .materials import cdrf_node, install, is_mapped, require_editable
 from .mesh_io import (
     Shape,
@@ -462,7 +462,8 @@ class Setup:
         for work in self.work:
             self._store(work, sources)
         for material, source in sources.items():
-            self._install(material, source, lights)
+            self._install(material, source, linking.reaching(lights, material, self.view_layer))
+        linking.write_unlit()
         display.refresh(self.scene, skins_of(self.view_layer))
         reflectance_models.remove_unused()
         self._sum_up(lights, sources)
@@ -551,8 +552,14 @@ class Setup:
             mapped=is_mapped(material),
             occluded=settings.ambient_occlusion,
             shadows=shadows.choose(material, self.view_layer),
+            links=linking.links_of(lights),
         )
         group = shader.ensure_shader_group(wanted, self.scene, lights, self.world)
+        if linking.without_bit(group):
+            self.report.warnings.append(
+                f"More than {shader.MOST_SELECTIVE} lights are linked to some objects of a "
+                f"material and not to others: '{linking.without_bit(group)[0]}' shines on all of them."
+            )
         before = cdrf_node(material)
         had_detail = before is not None and ids.DETAIL_SIZE in before.inputs
         node = install(material, group)
@@ -590,19 +597,10 @@ class Setup:
                 report.warnings.append(
                     f"'{work.users[0].name}' is flat: it looks the same at any scatter distance."
                 )
-        for item in self.view_layer.objects:
-            inside = item.instance_collection if item.instance_type == "COLLECTION" else None
-            if inside is not None and any(part.type == "LIGHT" for part in inside.all_objects):
-                report.warnings.append(
-                    f"The lights inside the instance '{item.name}' do not reach the surface: "
-                    "make them real (Object > Apply > Make Instances Real)."
-                )
-        limited = [light.object.name for light in lights if is_linked_to_some(light.object)]
-        if limited:
+        for item in nested_instances(self.view_layer):
             report.warnings.append(
-                f"The light '{limited[0]}' is linked to some objects only, which the translucent "
-                "surface does not heed: exclude the light's collection from this view layer, or "
-                "lower its power, if it should not shine here."
+                f"'{item.name}' instances a collection that instances lights in its turn; these do "
+                "not reach the surface: make it real (Object > Apply > Make Instances Real)."
             )
         if not lights and self.world is None:
             report.warnings.append("The scene has no light that renders, so the surface is black.")

@@ -8,9 +8,9 @@ each model of reflectance; the branches are one per light. Wiring:
                      -> x Sigma0 x Ratio -> squared = variance --------+
     normal (or map) -------+                                          |
     light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance/moment
-            -> Radiance (x visibility: shadows.py) ---> x f --> sum over i --> x Base Color
-    world (ambient_nodes.py) ------------------------------------> + ^
-                                                                           x Strength -> Emission
+            -> Radiance (x received, x visibility) -----> x f --> sum over i --> x Base Color
+    world (ambient_nodes.py) -------------------------------> + ^
+                                                                      x Strength -> Emission
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 
@@ -41,12 +41,14 @@ from .shadow_edge import edge_group
 from .shadows import NO_SHADOWS, Choice
 from .world import WorldLight, is_same, stamp, stamped
 
-VERSION = 9
+VERSION = 10
 
 # A channel narrower than a hundredth of the widest is Lambert in every row of the table.
 LEAST_MOMENT = 1e-4
 # A sun of more than 3 degrees blurs the terminator visibly (lights.HARD_SUN).
 SMALL_SUN = math.sin(HARD_SUN / 2.0) ** 2
+# Whole numbers up to 2^24 are exact in the 32-bit float as which a property reaches the shader.
+MOST_SELECTIVE = 24
 
 Normals = dict[str, Any]
 """Sets of channels that share a normal, and the normal."""
@@ -71,6 +73,8 @@ class Variant:
     """Whether what is near takes away from the world's light."""
     shadows: Choice = NO_SHADOWS
     """Whether the lights' cast shadows fall on the surface, and how."""
+    links: str = ""
+    """Lights with light linking that the group has (linking.links_of); empty if there are none."""
 
     @property
     def name(self) -> str:
@@ -81,6 +85,7 @@ class Variant:
         extras += (" shadows" if self.shadows.cast else "") + (
             " coloured" if self.shadows.edges else ""
         )
+        extras += " linked" if self.links else ""
         return f"CDRF {name_of(self.model)} {lookups}{source}{extras}"
 
 
@@ -92,6 +97,7 @@ def variant_of(
     mapped: bool = False,
     occluded: bool = False,
     shadows: Choice = NO_SHADOWS,
+    links: str = "",
 ) -> Variant:
     """Choose the variant with one look-up per distinct sigma0.
 
@@ -99,7 +105,7 @@ def variant_of(
     each channel a normal of its own.
     """
     if source == FLAT and not mapped:
-        return Variant("RGB", FLAT, model, False, occluded, shadows)
+        return Variant("RGB", FLAT, model, False, occluded, shadows, links)
     red, green, blue = ratio
     if red == green == blue:
         channels = "RGB"
@@ -111,7 +117,7 @@ def variant_of(
         channels = "RB G"
     else:
         channels = "R G B"
-    return Variant(channels, source, model, mapped, occluded, shadows)
+    return Variant(channels, source, model, mapped, occluded, shadows, links)
 
 
 def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
@@ -126,6 +132,7 @@ def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
         bool(group.get(ids.MAPPED_KEY, False)),
         bool(group.get(ids.OCCLUDED_KEY, False)),
         Choice(bool(group.get(ids.SHADOW_KEY, False)), bool(group.get(ids.EDGE_KEY, False))),
+        group.get(ids.LINKS_KEY, ""),
     )
 
 
@@ -162,6 +169,7 @@ def ensure_shader_group(
         group[ids.OCCLUDED_KEY] = variant.occluded
         group[ids.SHADOW_KEY] = variant.shadows.cast
         group[ids.EDGE_KEY] = variant.shadows.edges
+        group[ids.LINKS_KEY] = variant.links
         group[ids.SCENE_KEY] = scene.name
         group.color_tag = "SHADER"
         group.description = "Curvature-dependent translucency (Kubo et al. 2011), made by CDRF"
@@ -196,7 +204,7 @@ def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) ->
     if table is None:
         # Where only the world shines nothing may have used it, and a saved file drops it.
         return not lights and not wired_lights(group)
-    wanted = {(light.object, light.kind, branch_lookups(table, variant, light)) for light in lights}
+    wanted = {wanted_branch(table, variant, light) for light in lights}
     if layers_due(group, lights) or shadows_due(group, lights):
         return False
     return set(wired_lights(group)) == wanted
@@ -204,15 +212,15 @@ def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) ->
 
 def layers_due(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -> str:
     """Say which light other view layers leave out than those the group was made for."""
-    targets = _targets(group)
+    sources = _sources(group)
     wired = {
-        targets.get(node.name): tuple(node.get(ids.EXCLUDED_KEY, "").splitlines())
+        sources.get(node.name): tuple(node.get(ids.EXCLUDED_KEY, "").splitlines())
         for node in group.nodes
         if ids.LIGHT_KEY in node
     }
     for light in lights:
-        if wired.get(light.object, light.excluded) != light.excluded:
-            return f"light '{light.object.name}' is in other view layers now"
+        if wired.get(light.source, light.excluded) != light.excluded:
+            return f"light '{light.name}' is in other view layers now"
     return ""
 
 
@@ -221,43 +229,86 @@ def shadows_due(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) -
     if not stamped_variant(group).shadows.cast:
         return ""
     wired = {node.name for node in group.nodes if node.get(ids.SHADOW_KEY)}
-    targets = _targets(group)
-    casting = {targets.get(name) for name in wired}
-    changed = [light for light in lights if light.casts != (light.object in casting)]
+    sources = _sources(group)
+    casting = {sources.get(name) for name in wired}
+    changed = [light for light in lights if light.casts != (light.source in casting)]
     if changed:
-        return f"light '{changed[0].object.name}' casts shadows now, or no more"
+        return f"light '{changed[0].name}' casts shadows now, or no more"
+    if stamped_variant(group).shadows.edges:
+        picky = {sources.get(name) for name in wired if group.nodes[name].get(ids.BLOCKERS_KEY)}
+        for light in lights:
+            if light.casts and light.picks_blockers != (light.source in picky):
+                return f"other objects block light '{light.name}' now"
     scene = bpy.data.scenes.get(group[ids.SCENE_KEY])
     if wired and scene and shadows.world_shines(scene.world) != group.get(ids.SHADOW_WORLD_KEY):
         return "the world's light was switched on or off"
     return ""
 
 
-def wired_lights(
-    group: bpy.types.ShaderNodeTree,
-) -> list[tuple[bpy.types.Object | None, str, str]]:
-    """List the lights of a group, the kind and the look-ups they were wired for.
+class Wired(NamedTuple):
+    """A light's branch of a shader group, as it was made."""
 
-    None stands for a light that was deleted.
+    object: bpy.types.Object | None
+    """The lamp; None if it, or the empty that instances it, was deleted."""
+    instance: bpy.types.Object | None
+    kind: str
+    selective: bool
+    """Whether each object says by itself that it does not receive the light."""
+    lookups: str
+
+
+def wanted_branch(table: Table, variant: Variant, light: SceneLight) -> Wired:
+    """Say what the branch of a light would be if it were made now."""
+    lookups = branch_lookups(table, variant, light)
+    return Wired(light.object, light.instance, light.kind, light.selective, lookups)
+
+
+def wired_lights(group: bpy.types.ShaderNodeTree) -> list[Wired]:
+    """List the branches of a group.
 
     The drivers' targets are asked, not names: they survive renaming.
     """
-    targets = _targets(group)
+    sources = _sources(group)
     return [
-        (targets.get(node.name), node[ids.LIGHT_KEY], node.get(ids.LOOKUPS_KEY, ""))
+        Wired(
+            *sources.get(node.name, (None, None)),
+            node[ids.LIGHT_KEY],
+            ids.BIT_KEY in node,
+            node.get(ids.LOOKUPS_KEY, ""),
+        )
         for node in group.nodes
         if ids.LIGHT_KEY in node
     ]
 
 
-def _targets(group: bpy.types.ShaderNodeTree) -> dict[str, bpy.types.Object | None]:
-    """Map the names of the light nodes to the lights that drive them."""
-    targets: dict[str, bpy.types.Object | None] = {}
-    if group.animation_data is not None:
-        for curve in group.animation_data.drivers:
-            escaped = curve.data_path.removeprefix('nodes["').partition('"].inputs["')[0]
-            target = curve.driver.variables[0].targets[0].id
-            targets[bpy.utils.unescape_identifier(escaped)] = target
-    return targets
+def light_bits(
+    group: bpy.types.ShaderNodeTree,
+) -> dict[tuple[bpy.types.Object | None, bpy.types.Object | None], int]:
+    """Map the selective lights of a group, each a lamp and the empty that instances it, to bits."""
+    bits = {node.name: node[ids.BIT_KEY] for node in group.nodes if ids.BIT_KEY in node}
+    sources = _sources(group) if bits else {}
+    return {sources.get(name, (None, None)): bit for name, bit in bits.items()}
+
+
+def _sources(
+    group: bpy.types.ShaderNodeTree,
+) -> dict[str, tuple[bpy.types.Object | None, bpy.types.Object | None]]:
+    """Map the names of the light nodes to the lamps that drive them, and the instancing empties."""
+    lamps: dict[str, bpy.types.Object | None] = {}
+    empties: dict[str, bpy.types.Object | None] = {}
+    instanced = {node.name for node in group.nodes if node.get(ids.INSTANCED_KEY)}
+    for curve in group.animation_data.drivers if group.animation_data is not None else ():
+        escaped, _, socket = curve.data_path.removeprefix('nodes["').partition('"].inputs["')
+        name = bpy.utils.unescape_identifier(escaped)
+        variables = curve.driver.variables
+        lamps[name] = variables[0].targets[0].id
+        if name in instanced and socket.startswith(ids.POWER):
+            empties[name] = variables[-1].targets[0].id
+    # Without its empty an instanced lamp is as good as deleted, even if it stands elsewhere too.
+    return {
+        name: (lamp if name not in instanced or empties.get(name) else None, empties.get(name))
+        for name, lamp in lamps.items()
+    }
 
 
 def _declare(tree: bpy.types.ShaderNodeTree) -> None:
@@ -341,9 +392,10 @@ def _build(
     if lights or (world is not None and has_bands(variant, world, table)):
         variance = _skin_variance(b, variant, given)
     branches = [_light_node(b, variant, light, table) for light in lights]
+    radiances = _radiances(b, branches)
     visible = {}
     if variant.shadows.cast and any(light.casts for light in lights):
-        visible = _visibilities(b, branches, lights)
+        visible = _visibilities(b, branches, radiances, lights)
         declare(b.tree, ids.THICKNESS, output=True, tip="Where the surface's own shadow begins")
         reach = shadows.thickness(b, given[ids.SIGMA0], given[ids.SIGMA0_RATIO])
         b.feed(result[ids.THICKNESS], reach)
@@ -356,8 +408,10 @@ def _build(
             Cosine=_cosine(b, normal, lit[ids.DIRECTION]),
             Variance=_with_light(b, variance, lit[ids.VARIANCE], lookups, table),
         ).outputs[ids.REFLECTANCE]
-        radiance = lit[ids.RADIANCE]
-        if number in visible and variant.shadows.edges and len(visible) <= shadows.MOST_ISOLATED:
+        radiance = radiances[number]
+        # Rays in screen space meet every object, also those that do not block this light.
+        edges = variant.shadows.edges and not node[ids.BLOCKERS_KEY]
+        if number in visible and edges and len(visible) <= shadows.MOST_ISOLATED:
             edge = b.group(
                 edge_group(),
                 f"Shadow Edge {node.name}",
@@ -426,8 +480,12 @@ def _light_node(
     b: TreeBuilder, variant: Variant, light: SceneLight, table: Table
 ) -> bpy.types.ShaderNode:
     """Add the node of a light, driven by it and stamped with what it was wired for."""
-    node = b.group(light_group(light.kind), light.object.name)
+    node = b.group(light_group(light.kind), light.name)
     node[ids.LIGHT_KEY] = light.kind
+    node[ids.INSTANCED_KEY] = light.instance is not None
+    node[ids.BLOCKERS_KEY] = light.picks_blockers
+    if light.selective:
+        node[ids.BIT_KEY] = _bit_of(light)
     node[ids.LOOKUPS_KEY] = branch_lookups(table, variant, light)
     node[ids.SHADOW_KEY] = variant.shadows.cast and light.casts
     if light.excluded:
@@ -437,9 +495,40 @@ def _light_node(
     return node
 
 
+def _bit_of(light: SceneLight) -> int:
+    """The bit that a light has in another group, else one that none has; -1 if there is none left.
+
+    Groups share the objects' property, so a light has the same bit in all.
+    """
+    taken = {}
+    for group in bpy.data.node_groups:
+        if is_shader_group(group):
+            taken.update(light_bits(group))
+    known = taken.get(light.source, -1)
+    free = set(range(MOST_SELECTIVE)) - set(taken.values())
+    return known if known >= 0 else min(free, default=-1)
+
+
+def _radiances(b: TreeBuilder, nodes: Sequence[bpy.types.ShaderNode]) -> list[Any]:
+    """Radiance of each light; nothing where the object does not receive it (ids.UNLIT_KEY)."""
+    radiances = [node.outputs[ids.RADIANCE] for node in nodes]
+    selective = {n: node[ids.BIT_KEY] for n, node in enumerate(nodes) if ids.BIT_KEY in node}
+    if selective:
+        unlit = b.node(
+            "ShaderNodeAttribute", attribute_type="OBJECT", attribute_name=ids.UNLIT_KEY
+        ).outputs["Fac"]
+    for number, bit in selective.items():
+        if bit >= 0:
+            shifted = b.math("FLOOR", b.math("MULTIPLY", unlit, 2.0**-bit))
+            received = b.math("SUBTRACT", 1.0, b.math("MODULO", shifted, 2.0))
+            radiances[number] = b.vector("SCALE", radiances[number], scale=received)
+    return radiances
+
+
 def _visibilities(
     b: TreeBuilder,
     nodes: Sequence[bpy.types.ShaderNode],
+    radiances: Sequence[Any],
     lights: Sequence[SceneLight],
 ) -> dict[int, Any]:
     """Visibility of each light that casts shadows, by its number; for the surface's own normal."""
@@ -447,8 +536,8 @@ def _visibilities(
     scene = bpy.data.scenes.get(b.tree[ids.SCENE_KEY])
     shines = shadows.world_shines(scene.world if scene is not None else None)
     branches = [
-        shadows.Branch(node.outputs[ids.DIRECTION], node.outputs[ids.RADIANCE], light.casts)
-        for node, light in zip(nodes, lights, strict=True)
+        shadows.Branch(node.outputs[ids.DIRECTION], radiance, light.casts)
+        for node, radiance, light in zip(nodes, radiances, lights, strict=True)
     ]
     return shadows.Shadows(b, branches, normal, world=shines).visibilities()
 

@@ -18,6 +18,9 @@ from .instances import shown_objects
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node
 
+Source = tuple[bpy.types.Object, bpy.types.Object | None]
+"""See `SceneLight.source`."""
+
 
 def _shows(
     view_layer: bpy.types.ViewLayer,
@@ -48,21 +51,22 @@ def lights_on_skin(
     if others:  # asked at every redraw of the panel, so not without need
         skins = {skin for skin in bpy.data.materials if cdrf_node(skin) is not None}
         layers += [one for one in others if one.use and _shows(one, skins, set(fresh))]
-    found: dict[bpy.types.Object, SceneLight] = {}
-    everywhere: set[bpy.types.Object] = set()
+    found: dict[Source, SceneLight] = {}
+    everywhere: set[Source] = set()
     for number, layer in enumerate(layers):
-        here = {light.object: light for light in scene_lights(scene, layer)}
+        here = {light.source: light for light in scene_lights(scene, layer)}
         everywhere = everywhere & set(here) if number else set(here)
         found = here | found
     lights = [
-        light if item in everywhere else replace(light, excluded=_exclude_flags(view_layer, item))
-        for item, light in found.items()
+        light if source in everywhere else replace(light, excluded=_flags_of(view_layer, light))
+        for source, light in found.items()
     ]
-    return sorted(lights, key=lambda light: light.object.name)
+    return sorted(lights, key=lambda light: light.name)
 
 
-def _exclude_flags(view_layer: bpy.types.ViewLayer, item: bpy.types.Object) -> tuple[str, ...]:
-    """Paths from a view layer to the Exclude flags of an object's collections."""
+def _flags_of(view_layer: bpy.types.ViewLayer, light: SceneLight) -> tuple[str, ...]:
+    """Paths from a view layer to the Exclude flags of the collections that show a light."""
+    item = light.instance or light.object
     flags: list[str] = []
 
     def visit(layer: bpy.types.LayerCollection, path: str) -> None:

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from .. import ids
-from . import gloss, shader, shadows, world
+from . import gloss, linking, shader, shadows, world
 from .image import Table, find_table
 from .lights import SceneLight
 from .materials import cdrf_node, skin_output
@@ -66,22 +66,25 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
     if shader.is_current(group, lights):
         return ""
     wired = shader.wired_lights(group)
-    now = {light.object: light.kind for light in lights}
-    before = {item: kind for item, kind, _ in wired if item is not None}
+    now = {light.source: light for light in lights}
+    before = {branch[:2]: branch for branch in wired if branch.object is not None}
     table = find_table(shader.stamped_variant(group).model)
     if table is None:
         return "the reflectance table was deleted; choose the model again"
     parts = []
-    for item, kind in now.items():
-        if item not in before:
-            parts.append(f"light '{item.name}' is new")
-        elif before[item] != kind:
-            parts.append(f"light '{item.name}' changed its type")
-    gone = len(wired) - len(before) + sum(item not in now for item in before)
+    for key, light in now.items():
+        if key not in before:
+            parts.append(f"light '{light.name}' is new")
+        elif before[key].kind != light.kind:
+            parts.append(f"light '{light.name}' changed its type")
+        elif before[key].selective != light.selective:
+            parts.append(f"light '{light.name}' is linked to other objects now")
+    gone = len(wired) - len(before) + sum(key not in now for key in before)
     if gone:
-        parts.append(f"{gone} light{'s are' if gone > 1 else ' is'} gone or hidden")
+        plural = "s are" if gone > 1 else " is"
+        parts.append(f"{gone} light{plural} gone or hidden, or linked to other objects now")
     if not parts:
-        resized = [light.object.name for light in lights if _other_lookups(group, table, light)]
+        resized = [light.name for light in lights if _other_lookups(group, table, light)]
         parts = [f"light '{name}' got another size" for name in resized]
     if not parts:
         due = (shader.layers_due(group, lights), shader.shadows_due(group, lights))
@@ -90,8 +93,8 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
 
 
 def _other_lookups(group: bpy.types.ShaderNodeTree, table: Table, light: SceneLight) -> bool:
-    wanted = shader.branch_lookups(table, shader.stamped_variant(group), light)
-    return (light.object, light.kind, wanted) not in shader.wired_lights(group)
+    wanted = shader.wanted_branch(table, shader.stamped_variant(group), light)
+    return wanted not in shader.wired_lights(group)
 
 
 def reasons_to_update(
@@ -110,7 +113,8 @@ def reasons_to_update(
             continue
         group = node.node_tree
         if not slot.material.is_editable:
-            if {item for item, *_ in shader.wired_lights(group)} != {one.object for one in lights}:
+            here = linking.reaching(lights, slot.material, view_layer)
+            if {one[:2] for one in shader.wired_lights(group)} != {one.source for one in here}:
                 reasons.append(
                     f"'{slot.material.name}' is linked and has the lights of its own file: Make "
                     "Translucent gives a library override of the object a copy lit by this scene."
@@ -129,9 +133,11 @@ def reasons_to_update(
             continue
         if group.get(ids.SCENE_KEY) != scene.name:
             reasons.append(f"'{slot.material.name}' was set up in another scene.")
-        due = lights_due(group, lights)
+        due = lights_due(group, linking.reaching(lights, slot.material, view_layer))
         if due:
             reasons.append(f"Lights: {due}.")
+        elif linking.unlit_is_due(item):
+            reasons.append(f"Lights: '{item.name}' receives others now.")
         if not playing and world.is_due(group, world.scene_world(scene, view_layer)):
             reasons.append("The world's light was changed.")
         variant = shader.stamped_variant(group)
@@ -151,6 +157,7 @@ def reasons_to_update(
             mapped=variant.mapped,
             occluded=variant.occluded,
             shadows=variant.shadows,
+            links=variant.links,
         )
         if wanted != variant:
             reasons.append("The colour ratio was changed in the node.")

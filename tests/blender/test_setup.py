@@ -12,6 +12,8 @@ import pytest
 from rig import Rig, cdrf_node
 
 from cdrf_addon import ids
+from cdrf_addon.blender import shader, state
+from cdrf_addon.blender.setup import Setup, run
 
 
 def attribute(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -217,6 +219,98 @@ def test_lights_added_removed_and_retyped_are_noticed(rig: Rig) -> None:
     assert "gone or hidden" in due()
     bpy.ops.cdrf.update()
     assert branches() == set()
+
+
+def test_light_linking_chooses_the_branches_of_each_material(rig: Rig) -> None:
+    first, second = rig.sphere(), rig.sphere()
+    key, rim, _ = (rig.light("SUN", name=name) for name in ("Key", "Rim", "Both"))
+    for item in (first, second):
+        item.select_set(True)
+    bpy.ops.cdrf.setup()
+    assert cdrf_node(first).node_tree == cdrf_node(second).node_tree
+    for light, item in ((key, first), (rim, second)):
+        light.light_linking.receiver_collection = bpy.data.collections.new(light.name)
+        light.light_linking.receiver_collection.objects.link(item)
+
+    def due(item: bpy.types.Object) -> str:
+        bpy.context.view_layer.update()
+        return " ".join(state.reasons_to_update(item, rig.scene, bpy.context.view_layer))
+
+    def lamps(item: bpy.types.Object) -> set[str]:
+        wired = shader.wired_lights(cdrf_node(item).node_tree)
+        return {branch.object.name for branch in wired if branch.object is not None}
+
+    assert "linked to other objects" in due(first)
+    bpy.ops.cdrf.update()
+    assert lamps(first) == {"Key", "Both"} and lamps(second) == {"Rim", "Both"}
+    assert ids.UNLIT_KEY not in first and ids.UNLIT_KEY not in second
+    # A slider that makes another group chooses the same.
+    first.data.materials[0].cdrf.sigma0_ratio = (1.0, 0.5, 0.2)
+    assert lamps(first) == {"Key", "Both"}
+    key.name = "Renamed"
+    assert due(first) == due(second) == ""
+
+    # A light has one bit, whatever group it is in.
+    second.data.materials.append(first.data.materials[0])
+    bpy.ops.cdrf.update()
+    bits = shader.light_bits(cdrf_node(first).node_tree)
+    assert set(bits) == {(key, None), (rim, None)}
+    assert second[ids.UNLIT_KEY] == 1 << bits[key, None]
+    assert first[ids.UNLIT_KEY] == 1 << bits[rim, None]
+    key.light_linking.receiver_collection.objects.link(second)
+    rim.light_linking.receiver_collection = None
+    assert "'Renamed' is linked to other objects" in due(first)
+    bpy.ops.cdrf.update()
+    assert lamps(first) == {"Renamed", "Rim", "Both"} == lamps(second)
+    assert ids.UNLIT_KEY not in first and ids.UNLIT_KEY not in second
+    assert due(first) == due(second) == ""
+
+
+def test_more_linked_lights_than_a_number_has_bits(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shader, "MOST_SELECTIVE", 1)
+    first = rig.sphere()
+    second = rig.link(first.data)
+    for name in ("Key", "Rim"):
+        linking = rig.light("SUN", name=name).light_linking
+        linking.receiver_collection = bpy.data.collections.new(name)
+        linking.receiver_collection.objects.link(first)
+    bpy.context.view_layer.update()
+    report = run(Setup(bpy.context, [first]))
+    assert any("'Rim' shines on all" in warning for warning in report.warnings)
+    assert second[ids.UNLIT_KEY] == 1.0
+    assert state.reasons_to_update(second, rig.scene, bpy.context.view_layer) == []
+
+
+def test_instanced_lights_deleted_and_nested(rig: Rig) -> None:
+    lamp = rig.light("POINT", name="Lamp")
+    inside = bpy.data.collections.new("Inside")
+    inside.objects.link(lamp)
+    empties = [rig.link(None), rig.link(None)]
+    for empty in empties:
+        empty.instance_type, empty.instance_collection = "COLLECTION", inside
+    ball = rig.sphere()
+    assert run(Setup(bpy.context, [ball])).warnings == []
+    group = cdrf_node(ball).node_tree
+    drivers = group.animation_data.drivers
+    assert all(curve.driver.is_simple_expression and curve.driver.is_valid for curve in drivers)
+    before = {(wired.object, wired.instance) for wired in shader.wired_lights(group)}
+    assert before == {(lamp, None), (lamp, empties[0]), (lamp, empties[1])}
+    bpy.data.objects.remove(empties[1])
+    due = state.reasons_to_update(ball, rig.scene, bpy.context.view_layer)
+    assert due == ["Lights: 1 light is gone or hidden, or linked to other objects now."]
+    bpy.ops.cdrf.update()
+    assert state.reasons_to_update(ball, rig.scene, bpy.context.view_layer) == []
+
+    outside = bpy.data.collections.new("Outside")
+    outside.objects.link(empties[0])
+    nest = rig.link(None)
+    nest.name = "Nest"
+    nest.instance_type, nest.instance_collection = "COLLECTION", outside
+    bpy.context.view_layer.update()
+    warnings = run(Setup(bpy.context, [ball])).warnings
+    assert len(warnings) == 1 and "'Nest'" in warnings[0] and "Make Instances Real" in warnings[0]
 
 
 def test_every_driver_is_free_of_python(rig: Rig) -> None:

@@ -128,6 +128,51 @@ def test_two_and_three_lights_have_their_own_shadows(rig: Rig, count: int) -> No
     assert np.sqrt((off**2).mean()) <= SHADOW.rms
 
 
+def group_of(*items: bpy.types.Object) -> bpy.types.Collection:
+    found = bpy.data.collections.new("Linked")
+    for item in items:
+        found.objects.link(item)
+    return found
+
+
+@pytest.mark.smoke
+def test_a_light_not_received_leaves_the_others_shadows_alone(rig: Rig) -> None:
+    """Of two casting lights one shines only on another object of the same material."""
+    ball, bar = scene_of(rig, 2)
+    other = rig.link(ball.data)
+    other.location = (50.0, 0.0, 0.0)
+    second = next(item for item in rig.scene.objects if item.name.startswith("Sun."))
+    second.light_linking.receiver_collection = group_of(other)
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+    assert ids.UNLIT_KEY in ball and ids.UNLIT_KEY not in other
+    off = errors(rig, bar, 1)
+    assert off.max() <= SHADOW.worst
+    assert np.sqrt((off**2).mean()) <= SHADOW.rms
+
+
+@pytest.mark.smoke
+def test_shadow_linking(rig: Rig) -> None:
+    """The bar does not block the light: neither its shadow nor the coloured edge of one is seen."""
+    ball, bar = scene_of(rig, 1)
+    sun = next(item for item in rig.scene.objects if item.type == "LIGHT")
+    material = ball.data.materials[0]
+    material.cdrf.shadow_edges = True
+    blockers = sun.light_linking.blocker_collection = group_of(bar)
+    blockers.collection_objects[0].light_linking.link_state = "EXCLUDE"
+    assert ("block light 'Sun'" in reasons(ball)) == HAS_RAYCAST
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+    assert reasons(ball) == ""
+    assert shadow_nodes(ball) == 1  # the mask; its rays would meet the bar
+    picture = rig.render()[..., 0]
+    bar.location = (50.0, 0.0, 0.0)  # in theory it might as well be far away
+    bpy.context.view_layer.update()
+    wanted, clear = expected(bar, directions(1))
+    off = np.abs(picture - wanted)[clear]
+    print(f"worst {off.max():.2e}, RMS {np.sqrt((off**2).mean()):.2e}")
+    assert off.max() <= SHADOW.worst
+    assert np.sqrt((off**2).mean()) <= SHADOW.rms
+
+
 def test_four_lights_share_a_mask(rig: Rig) -> None:
     _, bar = scene_of(rig, 4)
     off = errors(rig, bar, 4)
