@@ -8,7 +8,7 @@ each model of reflectance; the branches are one per light. Wiring:
                      -> x Sigma0 x Ratio -> squared = variance --------+
     normal (or map) -------+                                          |
     light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance/moment
-            -> Radiance (x received) (x visibility: shadows.py) ---> x f --> sum over i --> x Base Color
+            -> Radiance (x received, x visibility) -> x f --> sum over i --> x Base Color
     world (ambient_nodes.py) ------------------------------------> + ^
                                                                            x Strength -> Emission
 """
