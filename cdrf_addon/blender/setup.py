@@ -555,10 +555,11 @@ class Setup:
             links=linking.links_of(lights),
         )
         group = shader.ensure_shader_group(wanted, self.scene, lights, self.world)
-        if linking.without_bit(group):
+        beyond = linking.without_bit(group)
+        if beyond:
             self.report.warnings.append(
-                f"More than {shader.MOST_SELECTIVE} lights are linked to some objects of a "
-                f"material and not to others: '{linking.without_bit(group)[0]}' shines on all of them."
+                f"More than {shader.MOST_SELECTIVE} lights are linked to some of the objects that "
+                f"share a material: '{beyond[0]}' shines on all of them. Use more materials."
             )
         before = cdrf_node(material)
         had_detail = before is not None and ids.DETAIL_SIZE in before.inputs

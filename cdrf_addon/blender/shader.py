@@ -8,9 +8,9 @@ each model of reflectance; the branches are one per light. Wiring:
                      -> x Sigma0 x Ratio -> squared = variance --------+
     normal (or map) -------+                                          |
     light i -> Direction --+-> dot -> Cosine --------> Reflectance <--+-- + light's Variance/moment
-            -> Radiance (x received, x visibility) -----> x f --> sum over i --> x Base Color
-    world (ambient_nodes.py) -------------------------------> + ^
-                                                                      x Strength -> Emission
+            -> Radiance (x received, x visibility) -> x f --> sum over i --> x Base Color
+    world (ambient_nodes.py) ------------------------------------> + ^
+                                                                           x Strength -> Emission
 """
 
 from __future__ import annotations

@@ -223,7 +223,7 @@ def test_lights_added_removed_and_retyped_are_noticed(rig: Rig) -> None:
 
 def test_light_linking_chooses_the_branches_of_each_material(rig: Rig) -> None:
     first, second = rig.sphere(), rig.sphere()
-    key, rim, _ = (rig.light("SUN", name=name) for name in ("Key", "Rim", "Both"))
+    key, rim, _both = (rig.light("SUN", name=name) for name in ("Key", "Rim", "Both"))
     for item in (first, second):
         item.select_set(True)
     bpy.ops.cdrf.setup()
