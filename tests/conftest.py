@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from checkout import CheckoutIsNoPackage
 
 
 @pytest.fixture(scope="session")
@@ -22,3 +23,7 @@ def rig(_enabled: None):
     from rig import Rig
 
     return Rig()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(CheckoutIsNoPackage())
