@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +21,8 @@ FRESH = (0.11, 0.3)
 SKIN = (0.8, 0.5, 0.4)
 RATIO = (1.0, 0.35, 0.2)
 TINY = Quality((24, 8), 2, 2)
-# Eight times the default's paths: what noise is left can be subtracted and hides nothing.
-REFERENCE = Quality((80, 20), 128, 16)
+# Four times the default's paths: what noise is left can be subtracted and hides nothing.
+REFERENCE = Quality((80, 20), 96, 10)
 
 
 @pytest.mark.slow
@@ -61,25 +60,24 @@ def tiny(monkeypatch: pytest.MonkeyPatch) -> Request:
 
 
 @pytest.mark.smoke
-def test_progress_comes_often_and_the_result_is_kept(tiny: Request, tmp_path: Path) -> None:
-    steps, told, last, longest = measure_steps(tiny, tmp_path), [], time.perf_counter(), 0.0
+def test_progress_comes_often_and_the_result_is_kept(
+    tiny: Request, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert measuring.POLL_SECONDS <= 0.1  # Esc and the bar stay alive
+    steps, told = measure_steps(tiny, tmp_path), []
     while True:
         try:
             told.append(next(steps))
         except StopIteration as done:
             first = done.value
             break
-        now = time.perf_counter()
-        longest, last = max(longest, now - last), now
     parts = [part for part, _ in told]
     assert parts == sorted(parts)
     assert parts[-1] == 1.0
-    assert longest < 0.5  # 0.05 on a free machine
     assert [path.suffix for path in tmp_path.iterdir()] == [".npz"]
     assert first.values.shape[:2] == (3, 3)
-    start = time.perf_counter()
+    monkeypatch.setattr(measuring, "WORKER", tmp_path / "none")  # nothing is rendered again
     again = measure(tiny, tmp_path)
-    assert time.perf_counter() - start < 1.0
     assert (again.values == first.values).all()
 
 
