@@ -60,7 +60,8 @@ def _rendering() -> bool:
 def _signature(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> tuple[object, ...]:
     lights = scene_lights(scene, layer)
     return tuple(
-        (light.name, light.object.session_uid, light.kind, light.casts) for light in lights
+        (light.name, light.object.session_uid, light.kind, light.casts, light.soft)
+        for light in lights
     )
 
 
@@ -126,17 +127,18 @@ def update_lights(context: bpy.types.Context) -> int:
 
 def _tick() -> float | None:
     """Timer: update once Blender is idle in Object Mode."""
-    windows = bpy.context.window_manager.windows
-    window = bpy.context.window or (windows[0] if len(windows) else None)
-    with bpy.context.temp_override(window=window):
-        if _rendering() or bpy.context.mode != "OBJECT":
-            return WAIT_SECONDS
-        try:
-            changed = update_lights(bpy.context)
-        except CdrfError:
-            return None  # the panel goes on offering Update, which says why it cannot be done
-        if changed:
-            bpy.ops.ed.undo_push(message="Update Translucent Lights")
+    # Each window may show another scene; a Blender without windows has one scene open.
+    changed = 0
+    for window in list(bpy.context.window_manager.windows) or [None]:
+        with bpy.context.temp_override(window=window):
+            if _rendering() or bpy.context.mode != "OBJECT":
+                return WAIT_SECONDS
+            try:
+                changed += update_lights(bpy.context)
+            except CdrfError:
+                continue  # the panel goes on offering Update, which says why it cannot be done
+    if changed:
+        bpy.ops.ed.undo_push(message="Update Translucent Lights")
     return None
 
 

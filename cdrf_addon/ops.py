@@ -183,7 +183,7 @@ class CDRF_OT_remove(bpy.types.Operator):
         except CdrfError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        users = [item for item in context.scene.objects if chosen & set(skins_on(item))]
+        users = [item for item in bpy.data.objects if chosen & set(skins_on(item))]
         for material in chosen:
             display.show_skin(material)
             materials.remove(material)
@@ -192,7 +192,7 @@ class CDRF_OT_remove(bpy.types.Operator):
             display.hide(())
             viewport.restore(context)
         for item in users:
-            if not skins_on(item) and item.data.is_editable:
+            if not skins_on(item) and item.is_editable and item.data.is_editable:
                 remove_curvature(item.data)
                 item.data.cdrf.fingerprint = ""
                 if ids.SCALE_KEY in item:

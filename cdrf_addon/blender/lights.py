@@ -38,6 +38,10 @@ ONE_SIZE = {"SQUARE", "DISK"}
 HARD_SUN = math.radians(3.0)
 
 
+# Blender cuts a driver's expression at 256 characters.
+MOST_FLAGS = 30
+
+
 @dataclass(frozen=True)
 class SceneLight:
     """A light that can reach the camera's picture of a scene."""
@@ -261,7 +265,7 @@ def _power(light: SceneLight, channel: int) -> tuple[str, Paths]:
     elif light.type in {"POINT", "SPOT"}:
         paths |= {"n": "data.normalize", "r": "data.shadow_soft_size"}
         expression += "*(n+(1-n)*4*pi*r*r)"
-    if light.excluded:
+    if 0 < len(light.excluded) <= MOST_FLAGS:
         flags = {f"l{number}": path for number, path in enumerate(light.excluded)}
         paths |= {name: f"layer:{path}" for name, path in flags.items()}
         expression += f"*(1-{'*'.join(flags)})"

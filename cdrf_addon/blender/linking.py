@@ -13,8 +13,7 @@ from dataclasses import replace
 import bpy
 
 from .. import ids
-from .instances import shown_objects
-from .lights import SceneLight
+from .lights import SceneLight, is_instance
 from .materials import cdrf_node
 from .shader import light_bits
 from .skin_lights import lights_on_skin
@@ -58,8 +57,12 @@ def reaching(
     """Leave out the lights that no object of the material receives; mark those that some do."""
     if all(light.receivers is None for light in lights):
         return list(lights)
-    shown = {item for layer in view_layer.id_data.view_layers for item in shown_objects(layer)}
-    users = [item for item in shown if material in _materials(item)]
+    users = {
+        item
+        for layer in view_layer.id_data.view_layers
+        for item in layer.objects
+        if material in _materials(item)
+    }
     found = []
     for light in lights:
         received = {receives(light, item) for item in users}
@@ -71,7 +74,7 @@ def reaching(
 def links_of(lights: Iterable[SceneLight]) -> str:
     """Name the lights with light linking, by which groups of one variant are told apart."""
     linked = [
-        f"{light.name}{' on some' if light.selective else ''}"
+        f"{[one.name_full for one in light.source if one]}{' on some' if light.selective else ''}"
         for light in lights
         if light.receivers is not None
     ]
@@ -81,18 +84,38 @@ def links_of(lights: Iterable[SceneLight]) -> str:
 def write_unlit() -> None:
     """Tell every object of the file which of its groups' lights it does not receive."""
     for item in bpy.data.objects:
-        if item.type != "MESH" or not item.is_editable:
+        if not item.is_editable:
             continue
         unlit = _unlit(item)
-        if unlit:
+        # An instance without the property would have that of the object in it.
+        if unlit or (is_instance(item) and _has_bits(item)):
             item[ids.UNLIT_KEY] = float(unlit)
         elif ids.UNLIT_KEY in item:
             del item[ids.UNLIT_KEY]
 
 
 def unlit_is_due(item: bpy.types.Object) -> bool:
-    """Tell whether an object says wrongly which lights it does not receive."""
-    return item.is_editable and int(item.get(ids.UNLIT_KEY, 0)) != _unlit(item)
+    """Tell whether an object, or an instance of it, says wrongly which lights it does not get."""
+    if not _has_bits(item):
+        return item.is_editable and ids.UNLIT_KEY in item
+    seen = [item] + [
+        empty
+        for empty in bpy.data.objects
+        if is_instance(empty) and item.name in empty.instance_collection.all_objects
+    ]
+    return any(one.is_editable and int(one.get(ids.UNLIT_KEY, 0)) != _unlit(one) for one in seen)
+
+
+def lost_on_saving(items: Iterable[bpy.types.Object]) -> list[str]:
+    """Name the library overrides whose property Blender will not save."""
+    return [
+        item.name for item in items if item.override_library is not None and ids.UNLIT_KEY in item
+    ]
+
+
+def _has_bits(item: bpy.types.Object) -> bool:
+    nodes = (cdrf_node(material) for material in _materials(item))
+    return any(node is not None and light_bits(node.node_tree) for node in nodes)
 
 
 def without_bit(group: bpy.types.ShaderNodeTree) -> list[str]:
@@ -111,4 +134,6 @@ def _unlit(item: bpy.types.Object) -> int:
 
 
 def _materials(item: bpy.types.Object) -> set[bpy.types.Material]:
-    return {slot.material for slot in item.material_slots if slot.material is not None}
+    """Materials of an object; of an instance those of what it shows, as EEVEE asks the empty."""
+    shown = item.instance_collection.all_objects if is_instance(item) else (item,)
+    return {slot.material for one in shown for slot in one.material_slots if slot.material}

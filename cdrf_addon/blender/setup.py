@@ -39,7 +39,7 @@ from ..core.summary import (
 from . import display, gloss, linking, reflectance_models, shader, shadows, state, world
 from .image import adopt_table
 from .instances import shown_objects
-from .lights import SceneLight, nested_instances
+from .lights import MOST_FLAGS, SceneLight, is_instance, nested_instances
 from .materials import cdrf_node, install, is_mapped, require_editable
 from .mesh_io import (
     Shape,
@@ -584,6 +584,40 @@ class Setup:
             kappas = [item.mean_values[0] for item in work]
             node.inputs[ids.CURVATURE].default_value = float(np.mean(kappas))
 
+    def _strange_lights(self, lights: list[SceneLight]) -> list[str]:
+        """Say what of the scene's light cannot be followed."""
+        told = []
+        makers = {
+            instance.parent.original
+            for instance in self.depsgraph.object_instances
+            if instance.is_instance and instance.object.type == "LIGHT" and instance.parent
+        }
+        told += [
+            f"The lights that '{maker.name}' instances (by vertices, faces, particles or geometry "
+            "nodes) do not reach the surface: make them real (Object > Apply > Make Instances "
+            "Real)."
+            for maker in makers
+            if not is_instance(maker)
+        ]
+        told += [
+            f"'{light.name}' is in more than {MOST_FLAGS} collections, too many to follow which "
+            "view layers exclude it: it shines in all of them."
+            for light in lights
+            if len(light.excluded) > MOST_FLAGS
+        ]
+        told += [
+            f"'{name}' is a library override, of which Blender does not save that it does not "
+            "receive every light: give it a material of its own, or update after opening the file."
+            for name in linking.lost_on_saving({item for work in self.work for item in work.users})
+        ]
+        used = [layer for layer in self.scene.view_layers if layer.use]
+        if len({world.scene_world(self.scene, layer) for layer in used}) > 1:
+            told.append(
+                "The view layers have different worlds; the surface has the light of the one that "
+                f"was open ('{self.view_layer.name}')."
+            )
+        return told
+
     def _sum_up(self, lights: list[SceneLight], sources: dict[bpy.types.Material, str]) -> None:
         report = self.report
         report.objects = sum(len(work.users) for work in self.work)
@@ -603,6 +637,7 @@ class Setup:
                 f"'{item.name}' instances a collection that instances lights in its turn; these do "
                 "not reach the surface: make it real (Object > Apply > Make Instances Real)."
             )
+        report.warnings += self._strange_lights(lights)
         if not lights and self.world is None:
             report.warnings.append("The scene has no light that renders, so the surface is black.")
         if self.scene.render.engine not in {EEVEE, "BLENDER_WORKBENCH"}:

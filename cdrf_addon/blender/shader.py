@@ -41,7 +41,7 @@ from .shadow_edge import edge_group
 from .shadows import NO_SHADOWS, Choice
 from .world import WorldLight, is_same, stamp, stamped
 
-VERSION = 10
+VERSION = 11
 
 # A channel narrower than a hundredth of the widest is Lambert in every row of the table.
 LEAST_MOMENT = 1e-4
@@ -205,7 +205,7 @@ def is_current(group: bpy.types.ShaderNodeTree, lights: Sequence[SceneLight]) ->
         # Where only the world shines nothing may have used it, and a saved file drops it.
         return not lights and not wired_lights(group)
     wanted = {wanted_branch(table, variant, light) for light in lights}
-    if layers_due(group, lights) or shadows_due(group, lights):
+    if layers_due(group, lights) or shadows_due(group, lights) or bits_due(group):
         return False
     return set(wired_lights(group)) == wanted
 
@@ -281,18 +281,18 @@ def wired_lights(group: bpy.types.ShaderNodeTree) -> list[Wired]:
     ]
 
 
-def light_bits(
-    group: bpy.types.ShaderNodeTree,
-) -> dict[tuple[bpy.types.Object | None, bpy.types.Object | None], int]:
+Source = tuple[bpy.types.Object | None, bpy.types.Object | None]
+"""A lamp and the empty that instances it; None if deleted, or if there is no empty."""
+
+
+def light_bits(group: bpy.types.ShaderNodeTree) -> dict[Source, int]:
     """Map the selective lights of a group, each a lamp and the empty that instances it, to bits."""
     bits = {node.name: node[ids.BIT_KEY] for node in group.nodes if ids.BIT_KEY in node}
     sources = _sources(group) if bits else {}
     return {sources.get(name, (None, None)): bit for name, bit in bits.items()}
 
 
-def _sources(
-    group: bpy.types.ShaderNodeTree,
-) -> dict[str, tuple[bpy.types.Object | None, bpy.types.Object | None]]:
+def _sources(group: bpy.types.ShaderNodeTree) -> dict[str, Source]:
     """Map the names of the light nodes to the lamps that drive them, and the instancing empties."""
     lamps: dict[str, bpy.types.Object | None] = {}
     empties: dict[str, bpy.types.Object | None] = {}
@@ -500,13 +500,39 @@ def _bit_of(light: SceneLight) -> int:
 
     Groups share the objects' property, so a light has the same bit in all.
     """
-    taken = {}
-    for group in bpy.data.node_groups:
-        if is_shader_group(group):
-            taken.update(light_bits(group))
-    known = taken.get(light.source, -1)
-    free = set(range(MOST_SELECTIVE)) - set(taken.values())
-    return known if known >= 0 else min(free, default=-1)
+    known = -1
+    others = set()
+    for source, bit in _all_bits():
+        if source == light.source:
+            known = max(known, bit)
+        else:
+            others.add(bit)
+    free = set(range(MOST_SELECTIVE)) - others
+    return known if known in free else min(free, default=-1)
+
+
+def _all_bits() -> list[tuple[Source, int]]:
+    """List the selective lights of all shader groups, and their bits."""
+    return [
+        pair
+        for group in bpy.data.node_groups
+        if is_shader_group(group)
+        for pair in light_bits(group).items()
+    ]
+
+
+def bits_due(group: bpy.types.ShaderNodeTree) -> str:
+    """Say which light shares its bit with another, or has none though there are free ones."""
+    own = light_bits(group)
+    if not own:
+        return ""
+    everywhere = _all_bits()
+    full = len({bit for _, bit in everywhere if bit >= 0}) >= MOST_SELECTIVE
+    for source, bit in own.items():
+        shared = any(other != source and bit == its for other, its in everywhere)
+        if source[0] is not None and (not full if bit < 0 else shared):
+            return f"light '{source[0].name}' needs another place in the objects' light property"
+    return ""
 
 
 def _radiances(b: TreeBuilder, nodes: Sequence[bpy.types.ShaderNode]) -> list[Any]:
@@ -515,7 +541,10 @@ def _radiances(b: TreeBuilder, nodes: Sequence[bpy.types.ShaderNode]) -> list[An
     selective = {n: node[ids.BIT_KEY] for n, node in enumerate(nodes) if ids.BIT_KEY in node}
     if selective:
         unlit = b.node(
-            "ShaderNodeAttribute", attribute_type="OBJECT", attribute_name=ids.UNLIT_KEY
+            # EEVEE asks the instancing empty; what is not instanced falls back to itself.
+            "ShaderNodeAttribute",
+            attribute_type="INSTANCER",
+            attribute_name=ids.UNLIT_KEY,
         ).outputs["Fac"]
     for number, bit in selective.items():
         if bit >= 0:

@@ -28,7 +28,7 @@ from typing import Any
 import bpy
 
 from .. import ids
-from ..compat import HAS_RAYCAST
+from ..compat import HAS_RAYCAST, uses_nodes
 from .instances import shown_objects
 from .nodetree import TreeBuilder, declare, ensure_group
 
@@ -79,7 +79,7 @@ def world_shines(world: bpy.types.World | None) -> bool:
     if world is None:
         return False
     tree = world.node_tree
-    if tree is None:
+    if tree is None or not uses_nodes(world):
         return bool(max(world.color) > 0.0)
     if world.animation_data is not None or tree.animation_data is not None:
         return True
@@ -104,10 +104,18 @@ def choose(material: bpy.types.Material, view_layer: bpy.types.ViewLayer) -> Cho
 
 
 def _casters(view_layer: bpy.types.ViewLayer) -> int:
-    """Count the objects that can cast a shadow; a skin is one of them itself."""
-    return sum(
-        item.type in SURFACES and item.visible_shadow and not item.hide_render
-        for item in shown_objects(view_layer)
+    """Count the objects that can cast a shadow in any rendered layer; a skin is one itself.
+
+    All layers share the material, so the answer must not depend on which of them is open.
+    """
+    layers = [layer for layer in view_layer.id_data.view_layers if layer.use] or [view_layer]
+    return len(
+        {
+            item
+            for layer in layers
+            for item in shown_objects(layer)
+            if item.type in SURFACES and item.visible_shadow and not item.hide_render
+        }
     )
 
 

@@ -17,6 +17,7 @@ from .. import ids
 from .instances import shown_objects
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node
+from .shader import wired_lights
 
 Source = tuple[bpy.types.Object, bpy.types.Object | None]
 """See `SceneLight.source`."""
@@ -44,13 +45,18 @@ def lights_on_skin(
 
     Args:
         scene: The scene.
-        view_layer: Counts whether or not it is rendered.
+        view_layer: Counts whether or not it is rendered; alone if no layer shows any skin.
         fresh: Objects that are about to become translucent.
     """
     layers, others = [view_layer], [one for one in scene.view_layers if one != view_layer]
     if others:  # asked at every redraw of the panel, so not without need
         skins = {skin for skin in bpy.data.materials if cdrf_node(skin) is not None}
-        layers += [one for one in others if one.use and _shows(one, skins, set(fresh))]
+        seen = [
+            one
+            for one in (view_layer, *others)
+            if (one.use or one == view_layer) and _shows(one, skins, set(fresh))
+        ]
+        layers = seen or layers
     found: dict[Source, SceneLight] = {}
     everywhere: set[Source] = set()
     for number, layer in enumerate(layers):
@@ -58,13 +64,13 @@ def lights_on_skin(
         everywhere = everywhere & set(here) if number else set(here)
         found = here | found
     lights = [
-        light if source in everywhere else replace(light, excluded=_flags_of(view_layer, light))
+        light if source in everywhere else replace(light, excluded=_flags_of(scene, light))
         for source, light in found.items()
     ]
     return sorted(lights, key=lambda light: light.name)
 
 
-def _flags_of(view_layer: bpy.types.ViewLayer, light: SceneLight) -> tuple[str, ...]:
+def _flags_of(scene: bpy.types.Scene, light: SceneLight) -> tuple[str, ...]:
     """Paths from a view layer to the Exclude flags of the collections that show a light."""
     item = light.instance or light.object
     flags: list[str] = []
@@ -76,16 +82,25 @@ def _flags_of(view_layer: bpy.types.ViewLayer, light: SceneLight) -> tuple[str, 
                 flags.append(f"{inside}.exclude")
             visit(child, inside)
 
-    visit(view_layer.layer_collection, "layer_collection")
+    visit(scene.view_layers[0].layer_collection, "layer_collection")
     return tuple(flags)
+
+
+def _home_of(group: bpy.types.ShaderNodeTree) -> bpy.types.Scene | None:
+    """Return the scene whose lights a group has; if it was renamed, the one that has them all."""
+    named = bpy.data.scenes.get(group.get(ids.SCENE_KEY, ""))
+    if named is not None:
+        return named
+    lamps = {branch.instance or branch.object for branch in wired_lights(group)} - {None}
+    scenes = bpy.data.scenes if lamps else ()
+    return next((one for one in scenes if lamps <= set(one.objects)), None)
 
 
 def lit_elsewhere(material: bpy.types.Material, scene: bpy.types.Scene) -> bpy.types.Scene | None:
     """Return the other scene whose lights a translucent material has, if it is seen there."""
     node = cdrf_node(material)
-    name = node.node_tree.get(ids.SCENE_KEY, scene.name) if node is not None else scene.name
-    other = bpy.data.scenes.get(name) if name != scene.name else None
-    if other is None:
+    other = _home_of(node.node_tree) if node is not None else None
+    if other is None or other == scene:
         return None
     seen = any(slot.material == material for item in other.objects for slot in item.material_slots)
     return other if seen else None

@@ -87,7 +87,11 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
         resized = [light.name for light in lights if _other_lookups(group, table, light)]
         parts = [f"light '{name}' got another size" for name in resized]
     if not parts:
-        due = (shader.layers_due(group, lights), shader.shadows_due(group, lights))
+        due = (
+            shader.layers_due(group, lights),
+            shader.shadows_due(group, lights),
+            shader.bits_due(group),
+        )
         parts = [part for part in due if part]
     return "; ".join(parts) or "the node group is incomplete or of an older version"
 

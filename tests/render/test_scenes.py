@@ -14,7 +14,9 @@ from rig import RESOLUTION, Rig, cdrf_node
 from tolerances import WRITTEN
 
 from cdrf_addon import ids
-from cdrf_addon.blender import state
+from cdrf_addon.blender import setup, shader, state
+from cdrf_addon.blender.shadows import choose
+from cdrf_addon.blender.skin_lights import lit_elsewhere
 from cdrf_addon.core.heat_kernel import sphere_reflectance
 
 Array = NDArray[np.float64]
@@ -235,3 +237,106 @@ def test_a_linked_character_is_lit_by_this_file(rig: Rig, tmp_path: Path) -> Non
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     fresh.scene = bpy.context.scene
     assert error(fresh.render(), ["Key", "Rim"]) <= WRITTEN.worst
+
+
+@pytest.mark.smoke
+def test_linking_of_a_skin_in_an_instance_is_that_of_the_empty(rig: Rig) -> None:
+    first, second = sun(rig, "Key"), sun(rig, "Rim")
+    ball = white_ball(rig, x=-0.75)
+    chars = bpy.data.collections.new("Chars")
+    rig.scene.collection.children.link(chars)
+    rig.scene.collection.objects.unlink(ball)
+    chars.objects.link(ball)
+    empty = rig.link(None, location=(1.5, 0.0, 0.0))
+    empty.instance_type, empty.instance_collection = "COLLECTION", chars
+    receivers = bpy.data.collections.new("Receivers")
+    receivers.objects.link(ball)
+    receivers.collection_objects[0].light_linking.link_state = "EXCLUDE"
+    second.light_linking.receiver_collection = receivers
+    assert "linked to other objects" in reasons(ball)
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+    assert reasons(ball) == ""
+    picture = rig.render()
+    assert error(picture, ["Key"], -0.75) <= WRITTEN.worst
+    assert error(picture, ["Key", "Rim"], 0.75) <= WRITTEN.worst
+    # The other way round.
+    receivers.objects.unlink(ball)
+    receivers.objects.link(empty)
+    receivers.collection_objects[0].light_linking.link_state = "EXCLUDE"
+    assert reasons(ball) != ""
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+    picture = rig.render()
+    assert error(picture, ["Key", "Rim"], -0.75) <= WRITTEN.worst
+    assert error(picture, ["Key"], 0.75) <= WRITTEN.worst
+    assert first.light_linking.receiver_collection is None
+
+
+def test_shadows_do_not_depend_on_which_view_layer_is_open(rig: Rig) -> None:
+    sun(rig, "Key").data.use_shadow = True
+    ball = white_ball(rig)
+    hat = rig.sphere(0.2)
+    hat.location.z = 0.8
+    own = bpy.data.collections.new("Hats")
+    rig.scene.collection.children.link(own)
+    rig.scene.collection.objects.unlink(hat)
+    own.objects.link(hat)
+    bare = rig.scene.view_layers.new("Bare")
+    bare.layer_collection.children["Hats"].exclude = True
+    skin = ball.data.materials[0]
+    assert choose(skin, rig.scene.view_layers[0]).cast and choose(skin, bare).cast
+    own.hide_render = True
+    hat.hide_render = True
+    assert not choose(skin, bare).cast
+
+
+def test_a_renamed_scene_keeps_its_skins(rig: Rig) -> None:
+    sun(rig, "Key")
+    ball = white_ball(rig)
+    skin = ball.data.materials[0]
+    other = bpy.data.scenes.new("Other")
+    other.collection.objects.link(ball)
+    home, name = rig.scene, rig.scene.name
+    assert lit_elsewhere(skin, home) is None and lit_elsewhere(skin, other) == home
+    home.name = "Renamed"
+    assert lit_elsewhere(skin, home) is None and lit_elsewhere(skin, other) == home
+    home.name = name
+    bpy.data.scenes.remove(other)
+
+
+def test_a_light_in_very_many_excluded_collections_is_told_of(rig: Rig) -> None:
+    lamp = sun(rig, "Key")
+    rig.sphere(RADIUS)
+    for number in range(60):
+        part = bpy.data.collections.new(f"Part {number}")
+        rig.scene.collection.children.link(part)
+        part.objects.link(lamp)
+    bare = rig.scene.view_layers.new("Bare")
+    for child in bare.layer_collection.children:
+        child.exclude = True
+    job = setup.Setup(bpy.context, bpy.context.selected_objects)
+    report = setup.run(job)
+    assert any("more than 30 collections" in line for line in report.warnings)
+    assert np.isfinite(rig.render()).all()
+    rig.scene.view_layers.remove(bare)
+
+
+def test_lights_never_share_a_place_in_the_objects_property(rig: Rig) -> None:
+    first, second = sun(rig, "Key"), sun(rig, "Rim")
+    ball, other = white_ball(rig, x=-0.75), rig.sphere(RADIUS)
+    other.data.materials.append(ball.data.materials[0])
+    for light, item in ((first, ball), (second, other)):
+        chosen = bpy.data.collections.new(light.name)
+        chosen.objects.link(item)
+        light.light_linking.receiver_collection = chosen
+    bpy.context.view_layer.update()
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+    group = cdrf_node(ball).node_tree
+    assert sorted(shader.light_bits(group).values()) == [0, 1]
+    # As after appending what another file numbered by itself.
+    for node in group.nodes:
+        if ids.BIT_KEY in node:
+            node[ids.BIT_KEY] = 0
+    assert "another place" in reasons(ball)
+    assert bpy.ops.cdrf.update() == {"FINISHED"}
+    assert len(set(shader.light_bits(cdrf_node(ball).node_tree).values())) == 2
+    assert reasons(ball) == ""

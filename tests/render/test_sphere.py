@@ -192,7 +192,7 @@ def test_energy_that_leaves_a_closed_sphere(rig: Rig, kind: str) -> None:
     order = np.argsort(cosine)
     # To both poles of the light, where no pixel's centre is.
     ends = np.concatenate(([-1.0], cosine[order], [1.0]))
-    for sigma in (0.0, 0.1, 0.3, 1.0, 3.0, 30.0):
+    for sigma in (0.0, 0.3, 3.0):
         material.cdrf.sigma0 = sigma
         value, _ = rig.render_exact(ball, "Shader", -0.01, 1.01)
         seen = value[covered][order, 0]
