@@ -133,12 +133,12 @@ def test_similarity_of_known_pictures() -> None:
     assert metrics.ssim(noise, noise, whole) == pytest.approx(1.0)
     c1, c2 = metrics.STEADY
     # Two constants differ in luminance alone.
-    flat = metrics.ssim_map(np.full((32, 32, 3), 0.3), np.full((32, 32, 3), 0.6))
+    grey = np.ones((32, 32, 3), dtype=np.float64)
+    flat = metrics.ssim_map(0.3 * grey, 0.6 * grey)
     assert flat == pytest.approx((2 * 0.3 * 0.6 + c1) / (0.3**2 + 0.6**2 + c1))
     # A pattern and its negative: the covariance is minus the variance.
-    board = np.indices((64, 64)).sum(axis=0) % 2 - 0.5
-    one, other = 0.5 + 0.2 * board[..., None], 0.5 - 0.2 * board[..., None]
-    inner = metrics.ssim_map(one, other)[16:48, 16:48]
+    board = np.array(np.indices((64, 64)).sum(axis=0) % 2 - 0.5, dtype=np.float64)[..., None]
+    inner = metrics.ssim_map(0.5 + 0.2 * board, 0.5 - 0.2 * board)[16:48, 16:48]
     variance = 0.1**2
     assert inner == pytest.approx((c2 - 2.0 * variance) / (2.0 * variance + c2), abs=1e-3)
 

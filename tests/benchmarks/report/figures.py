@@ -20,7 +20,7 @@ from PIL import Image
 from cdrf_addon.core.models import ring, sphere
 
 from .contenders import CONTENDERS, DEFAULT, LAMBERT, NODE, PATHS, PRINCIPLED, SHADOWS, TEXTURE
-from .matrix import load_pictures, pictures_path, wanted_cells
+from .matrix import load_pictures, measured_cells, pictures_path, wanted_cells
 from .metrics import displayed
 from .paper import stored
 from .scenes import FIRST
@@ -60,7 +60,7 @@ SHOWN = (
     f"{PATHS}, 16",
 )
 """In the rows of pictures; those that were not measured are left out."""
-NOSE, CHEEK = (0.30, 0.46, 0.40, 0.56), (0.46, 0.62, 0.30, 0.46)
+NOSE, CHEEK = (0.42, 0.58, 0.38, 0.54), (0.54, 0.70, 0.36, 0.52)
 """Left, right, bottom and top of the close-ups, parts of the picture."""
 COLOURS_IN_FILE = 256
 
@@ -95,8 +95,8 @@ def plain(axes: Axes, title: str = "") -> None:
 
 
 def brighter(pictures: Mapping[str, NDArray[Any]], key: str) -> float:
-    """Factor that brings the brightest hundredth of a picture to white."""
-    bright = float(np.percentile(pictures[key][..., :3].astype(np.float64).max(axis=-1), 99.0))
+    """Factor that brings the brightest thousandth of a picture near white."""
+    bright = float(np.percentile(pictures[key][..., :3].astype(np.float64).max(axis=-1), 99.9))
     return 0.9 / max(bright, 1e-6)
 
 
@@ -147,11 +147,13 @@ def _workflow(settings: Settings, heads: Mapping[str, NDArray[Any]]) -> None:
         table.set_xlabel("θ, degrees")
         table.set_ylabel("σ = σ₀ κ")
         table.grid(visible=False)
-        picture(render, heads["CDRF"][..., :3] * brighter(heads, "Path tracing"), "4. render")
+        picture(
+            render, heads["CDRF, shadows"][..., :3] * brighter(heads, "Path tracing"), "4. render"
+        )
 
 
 def _heads(settings: Settings, heads: Mapping[str, NDArray[Any]]) -> None:
-    names = ("curvature", "Lambert", "Texture blurring", "CDRF", "Path tracing")
+    names = ("curvature", "Lambert", "Texture blurring", "CDRF, shadows", "Path tracing")
     factor = brighter(heads, "Path tracing")
     size = len(heads["Lambert"])
     with figure(settings.data / "figure3.png", 11.5, 6.9) as sheet:
@@ -174,7 +176,7 @@ def _spheres(settings: Settings, spheres: Mapping[str, NDArray[Any]]) -> None:
         for axes, (name, values) in zip(
             sheet.subplots(1, len(spheres)), spheres.items(), strict=True
         ):
-            picture(axes, values[..., :3], f"red's scatter radius {name} of the sphere's")
+            picture(axes, values[..., :3], f"ratio {name}")
 
 
 # --- the matrix ----------------------------------------------------------------------------------
@@ -207,7 +209,8 @@ def cell_pictures(settings: Settings) -> None:
             plain(rows[1][0])
             for column, name in enumerate(names, start=1):
                 values = pictures[name][..., :3].astype(np.float64)
-                title = name.replace("EEVEE ", "EEVEE\n").replace("CDRF ", "CDRF\n")
+                title = name.replace("Subsurface Scattering", "scattering node")
+                title = title.replace("EEVEE ", "EEVEE\n").replace("CDRF ", "CDRF\n")
                 title = title.replace(" (the default)", "").replace(" (Diffuse BSDF)", "")
                 picture(rows[0][column], values * factor, title.replace("Random Walk, ", "\n"))
                 off = np.abs(values - truth) * factor * DIFFERENCE
@@ -240,10 +243,10 @@ def front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def pareto(settings: Settings, most: int = 6) -> list[str]:
     """Error against time of a frame, log-log; names of the cells drawn."""
-    errors, timing = settings.read("errors"), settings.read("timing")
+    timing = settings.read("timing")
     cells = {
         name: cell
-        for name, cell in errors.get("cells", {}).items()
+        for name, cell in measured_cells(settings).items()
         if list(_points(cell, timing, "all"))
     }
     names = list(cells)[:most]
@@ -284,7 +287,7 @@ def _pareto_panel(
 
 def preparation_plot(settings: Settings) -> bool:
     """Error against what comes before the first frame; whether there was anything to draw."""
-    cells = settings.read("errors").get("cells", {})
+    cells = measured_cells(settings)
     spent = preparation_seconds(settings)
     name = next(iter(cells), None)
     if name is None or not spent:

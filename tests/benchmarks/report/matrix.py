@@ -33,6 +33,13 @@ def wanted_cells(settings: Settings, patterns: Sequence[str] = ("*",)) -> list[C
     return [cell for cell in cells if any(fnmatch(cell.name, one) for one in patterns)]
 
 
+def measured_cells(settings: Settings) -> dict[str, Any]:
+    """Results of the cells that have any, the most telling first."""
+    known = settings.read("errors").get("cells", {})
+    names = [cell.name for cell in wanted_cells(settings)]
+    return {name: known[name] for name in names if known.get(name, {}).get("contenders")}
+
+
 def pictures_path(settings: Settings, cell: Cell) -> Path:
     """Where the contenders' pictures of a cell are kept until they are drawn."""
     name = cell.name.replace(", ", "_").replace(" ", "")

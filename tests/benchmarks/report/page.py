@@ -22,7 +22,7 @@ from .contenders import (
     chosen,
     row_name,
 )
-from .matrix import wanted_cells
+from .matrix import measured_cells, wanted_cells
 from .scenes import FIGURINE, HEAD, SOFTBOXES
 from .settings import Settings
 from .substances import PRESET_OF
@@ -66,9 +66,7 @@ class Page:
         self.timing = settings.read("timing")
         self.paper = settings.read("paper")
         self.stability = settings.read("stability")
-        self.cells: dict[str, Any] = {
-            name: cell for name, cell in self.errors.get("cells", {}).items() if cell["contenders"]
-        }
+        self.cells = measured_cells(settings)
 
     def image(self, name: str, text: str) -> list[str]:
         """A picture, if it was drawn."""
@@ -145,6 +143,9 @@ class Page:
             return []
         lines = [
             "### Fig. 2: spheres, and the fit",
+            "",
+            "Path-traced spheres of the skin, lit from the right; the ratio is red's scatter "
+            "radius to the sphere's.",
             "",
             *self.image("figure2.png", "Path-traced spheres, lit from the right"),
             *self.image("figure2_fit.png", "Radiance over the angle, fits and residuals"),
@@ -240,7 +241,8 @@ class Page:
         ]
         base = work["seconds"]["Lambert"]
         rows = []
-        for name, seconds in work["seconds"].items():
+        for name in ("Lambert", "CDRF", TEXTURE):
+            seconds = work["seconds"][name]
             over = [a / max(b, 1e-6) for a, b in zip(seconds, base, strict=True)]
             reads = {"CDRF": work["look-ups"], "Texture blurring": work["taps"]}.get(name, 0)
             rows.append(
@@ -310,15 +312,17 @@ class Page:
 
     # --- error -----------------------------------------------------------------------------------
 
-    def best_of(self, cell: Rows, mask: str = "all", *, eevee: bool = True) -> str:
-        """The contender with the least error of a cell."""
+    def best_of(self, cell: Rows, mask: str = "all", measure: str = "rmse") -> str:
+        """EEVEE's frame with the least error, or the highest similarity, of a cell."""
         engine = {one.name: one.engine for one in CONTENDERS}
         rows = cell["contenders"]
         names = [
             name
             for name, row in rows.items()
-            if "rmse" in row and (not eevee or engine.get(self._base(name)) == EEVEE)
+            if "rmse" in row and engine.get(self._base(name)) == EEVEE
         ]
+        if measure == "ssim":
+            return max(names, key=lambda name: rows[name]["ssim"][mask])
         return min(names, key=lambda name: rows[name]["rmse"][mask])
 
     @staticmethod
@@ -331,35 +335,62 @@ class Page:
         if not self.cells:
             return []
         found = []
-        for mask, words in (("all", "all pixels"), ("lit", "pixels out of cast shadows")):
-            wins = Counter(self._base(self.best_of(cell, mask)) for cell in self.cells.values())
+        for measure, words in (
+            ("rmse", "least RMSE over all pixels"),
+            ("ssim", "highest SSIM"),
+        ):
+            wins = Counter(
+                self._base(self.best_of(cell, measure=measure)) for cell in self.cells.values()
+            )
             told = ", ".join(f"{name} in {count}" for name, count in wins.most_common())
-            found.append(
-                f"Least RMSE among EEVEE's frames, {words}, {len(self.cells)} scenes: {told}."
-            )
-        shares: dict[str, float] = {}
-        for name in {name for cell in self.cells.values() for name in cell["contenders"]}:
-            rows = [cell["contenders"] for cell in self.cells.values()]
-            pairs = [
-                (row[name]["rmse"]["lit"], row[LAMBERT]["rmse"]["lit"])
-                for row in rows
-                if "rmse" in row.get(name, {}) and "rmse" in row.get(LAMBERT, {})
-            ]
-            if len(pairs) == len(self.cells) and pairs:
-                shares[name] = float(np.mean([a / b for a, b in pairs]))
-        if DEFAULT in shares:
-            ranked = sorted(
-                (share, name)
-                for name, share in shares.items()
-                if not name.startswith(PATHS) and name != LAMBERT
-            )
-            found.append(
-                "Out of cast shadows, as a part of Lambert's RMSE (mean of the scenes): "
-                + ", ".join(f"{name} {share:.2f}" for share, name in ranked)
-                + "."
-            )
-        found += self._equal_noise()
-        return found
+            found.append(f"Of EEVEE's frames in {len(self.cells)} scenes, {words}: {told}.")
+        return [*found, *self._against_texture(), *self._equal_noise()]
+
+    def _against_texture(self) -> list[str]:
+        """How often texture blurring is closer than the best of CDRF."""
+        pairs = []
+        for cell in self.cells.values():
+            rows = {name: row for name, row in cell["contenders"].items() if "rmse" in row}
+            ours = [row["rmse"]["all"] for name, row in rows.items() if name.startswith("CDRF")]
+            if TEXTURE in rows and ours:
+                pairs.append((rows[TEXTURE]["rmse"]["all"], min(ours)))
+        if not pairs:
+            return []
+        closer = sum(blurred < ours for blurred, ours in pairs)
+        return [
+            f"Texture blurring, where there are UVs, is closer than the best CDRF in {closer} of "
+            f"{len(pairs)} scenes."
+        ]
+
+    def _shares(self) -> list[str]:
+        """Each contender's error as a part of Lambert's, over the scenes that have both."""
+        rows = []
+        for one, samples in chosen(sample=self.settings.sample):
+            for count in samples or (self.settings.film,):
+                key = row_name(one.name, samples, count)
+                pairs = [
+                    (cell["contenders"][key], cell["contenders"][LAMBERT])
+                    for cell in self.cells.values()
+                    if "rmse" in cell["contenders"].get(key, {})
+                    and "rmse" in cell["contenders"].get(LAMBERT, {})
+                ]
+                if not pairs:
+                    rows.append((math.inf, [key, "0", DASH, DASH, DASH]))
+                    continue
+                parts = [
+                    math.exp(np.mean([math.log(a["rmse"][m] / b["rmse"][m]) for a, b in pairs]))
+                    for m in ("all", "lit")
+                ]
+                alike = float(np.mean([a["ssim"]["all"] for a, _ in pairs]))
+                shown = [f"{part:.2f}" for part in parts]
+                rows.append((parts[0], [key, str(len(pairs)), *shown, f"{alike:.3f}"]))
+        rows.sort(key=lambda row: row[0])
+        return [
+            "RMSE as a part of Lambert's in the same scene, geometric mean over the scenes that "
+            "have both (not all contenders have the same scenes), and mean SSIM:",
+            "",
+            *table(["contender, samples", "scenes", "all", "lit", "SSIM"], [r for _, r in rows]),
+        ]
 
     def _equal_noise(self) -> list[str]:
         """How many samples Cycles needs to be as close as the best frame of EEVEE."""
@@ -376,11 +407,24 @@ class Page:
                 told.append(f"{name}: {enough if enough else f'more than {counts[-1][0]}'}")
         if not told:
             return []
-        return [
+        found = [
             "Samples at which Cycles, not denoised, is as close as the best EEVEE frame: "
             + "; ".join(told)
             + "."
         ]
+        few = f"{PATHS}, denoised, 16"
+        pairs = [
+            (cell["contenders"][few], cell["contenders"][self.best_of(cell)])
+            for cell in self.cells.values()
+            if "rmse" in cell["contenders"].get(few, {})
+        ]
+        if pairs:
+            closer = sum(one["rmse"]["all"] < best["rmse"]["all"] for one, best in pairs)
+            found.append(
+                "Cycles with 16 samples and a denoiser is closer than every EEVEE frame in "
+                f"{closer} of {len(pairs)} scenes; what it costs is in the table of times."
+            )
+        return found
 
     def error_part(self) -> list[str]:
         """The matrix."""
@@ -396,6 +440,7 @@ class Page:
                 "",
             ]
         lines += [*self.image("preparation.svg", "Error against time of preparation")]
+        lines += self._shares()
         files = dict(figures.pictured(self.settings))
         for name, cell in self.cells.items():
             lines += self._cell_part(name, cell, files.get(name, ""))
@@ -420,11 +465,12 @@ class Page:
             "",
             "**Lights**: *sun*: one hard sun from the side; *key + fill + rim*: three discs; "
             f"*HDRI*: Blender's `{SOFTBOXES}`. The bust is the head, remeshed with chest, "
-            "eyes and plinth, as no statue is at hand.",
+            "eyes and plinth, as no statue is at hand. The world's settings are Blender's: EEVEE "
+            "takes the brightest spot of a picture for a sun with a shadow.",
             "",
             f"**Measure**: RMSE of linear radiance, mean of R, G, B, over every pixel the object "
             "covers (*all*), and over those in no cast shadow and not at the neck's open rim "
-            "(*lit*); SSIM (Wang et al. 2004) of what a screen shows, all pixels. EEVEE takes "
+            "(*lit*); SSIM (Wang et al. 2004) of what a screen shows. EEVEE takes "
             f"{size.film} samples where no number is given. MB: peak memory of the process above "
             "what it held before the frame.",
             "",
@@ -458,7 +504,9 @@ class Page:
                 seconds = frame_seconds(self.timing, one.name, count)
                 time = f"{seconds:.2f}" if math.isfinite(seconds) else DASH
                 structure = [f"{row['ssim'][m]:.4f}" for m in ("all", "lit")]
-                rows.append([key, *shown, *structure, time, f"{row['megabytes']:.0f}", over])
+                rows.append(
+                    [key, *shown, *structure, time, f"{max(row['megabytes'], 0.0):.0f}", over]
+                )
         lines = [f"### {name}", "", *(self.image(file, name) if file else [])]
         lines += [
             f"{cell['vertices']:,} vertices, {cell['pixels']['all']:,} pixels (*lit* "
@@ -485,7 +533,9 @@ class Page:
                 f"{rows[lit]['rmse']['lit'] / rows[LAMBERT]['rmse']['lit']:.2f}",
             ]
             sentence += f". Lambert's error times {parts[0]} (*all*), {parts[1]} (*lit*)"
-        return sentence + "."
+        every = {name: row["rmse"]["all"] for name, row in rows.items() if "rmse" in row}
+        whole = min(every, key=lambda name: every[name])
+        return f"{sentence}. Of everything: {whole} ({every[whole]:.4f})."
 
     def _missing(self) -> list[str]:
         absent = [cell.name for cell in wanted_cells(self.settings) if cell.name not in self.cells]

@@ -121,7 +121,7 @@ def _figure_1_and_3(settings: Settings) -> dict[str, Any]:
     stage.wear(stage.opaque)
     pictures["Lambert"] = stage.eevee(settings.film)
     with cdrf(stage, shadows=True) as render:
-        pictures["CDRF"] = render(settings.film)
+        pictures["CDRF, shadows"] = render(settings.film)
     geometry = stage.geometry
     colours, cost = texture_blurring.shade(
         geometry,
