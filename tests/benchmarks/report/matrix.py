@@ -23,7 +23,7 @@ from .settings import Settings
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-SAMPLE_CELLS = [Cell("sphere", "milk", "sun"), Cell("head", "skin", "sun")]
+SAMPLE_CELLS = [Cell("torus", "milk", "sun"), Cell("head", "skin", "sun")]
 BOUNCES = 12
 
 
