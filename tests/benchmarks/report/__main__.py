@@ -4,7 +4,8 @@
     ./dev python tests/benchmarks/report                  everything, from nothing: many hours
     ./dev python tests/benchmarks/report --missing        what is not there yet
     ./dev python tests/benchmarks/report --sample --docs output/sample         a few minutes
-    ./dev python tests/benchmarks/report --timing         the times: on a quiet machine
+    ./dev python tests/benchmarks/report --timing         the times, anew: on a quiet machine
+    ./dev python tests/benchmarks/report --timing --missing       rounds that are not there yet
     ./dev python tests/benchmarks/report --only page      figures and pages from the raw results
 
 Stages are paper, errors, timing, stability and page. References are kept by their parameters in the
@@ -73,8 +74,8 @@ def main() -> None:
             paper.run(here, missing=chosen.missing)
         if "timing" in stages:
             parts = chosen.parts or list(timing.PARTS)
-            if not chosen.missing and not chosen.timing and not chosen.sample:
-                (here.data / "timing.json").unlink(missing_ok=True)
+            if not chosen.missing:
+                timing.forget(here, parts)
             timing.run(here, chosen.rounds or here.rounds, parts, deadline)
         if "stability" in stages and time.monotonic() < deadline:
             stability.run(here)

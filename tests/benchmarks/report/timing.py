@@ -102,6 +102,12 @@ def run(settings: Settings, rounds: int, parts: Sequence[str], deadline: float) 
             settings.write("timing", results)
 
 
+def forget(settings: Settings, parts: Sequence[str]) -> None:
+    """Throw away the rounds of earlier runs."""
+    results = settings.read("timing")
+    settings.write("timing", {name: part for name, part in results.items() if name not in parts})
+
+
 def _keep(known: dict[str, Any], name: str, point: object, spent: Spent) -> None:
     """Add a round's measurement. A round that was broken off was never written."""
     known["rows"].setdefault(name, {}).setdefault(str(point), []).append(spent)
