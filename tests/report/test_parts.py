@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from report import metrics, stability, texture_blurring
-from report.figures import front
 from report.matrix import keep_pictures, load_pictures
 from report.settings import quick
 from report.substances import PRESET_OF, profile_of, substance
@@ -150,6 +149,8 @@ def test_rmse_is_the_mean_of_the_channels() -> None:
 
 
 def test_the_front_is_what_nothing_beats() -> None:
+    from report.figures import front  # late: matplotlib is not in every environment
+
     points = [(1.0, 0.5), (2.0, 0.6), (3.0, 0.2), (0.5, 0.9), (3.5, 0.2)]
     assert front(points) == [(0.5, 0.9), (1.0, 0.5), (3.0, 0.2)]
 
