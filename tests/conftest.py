@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from pathlib import Path
 
 import pytest
 from checkout import CheckoutIsNoPackage
+from stability import Collector
+
+STABILITY = pytest.StashKey[Collector]()
 
 
 @pytest.fixture(scope="session")
@@ -25,5 +29,40 @@ def rig(_enabled: None):
     return Rig()
 
 
+# --- what the page on stability tells (tests/support/stability.py) ------------------------------
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--stability", type=Path, help="write what extreme cases came to, as JSON")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(CheckoutIsNoPackage())
+    config.stash[STABILITY] = Collector(Path(__file__).parent)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    for item in items:
+        if config.stash[STABILITY].entry(item.nodeid, item.path) is not None:
+            item.add_marker("stability")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    collector = item.config.stash[STABILITY]
+    extreme = collector.entry(item.nodeid, item.path)
+    if extreme is not None and (report.when == "call" or report.failed):
+        said = "; ".join(str(value) for _, value in report.user_properties)
+        collector.add(extreme, item.nodeid, report.outcome, report.duration, said)
+    return report
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    path = session.config.getoption("--stability")
+    if path is not None:
+        from machine import machine
+
+        session.config.stash[STABILITY].write(path, machine())

@@ -185,8 +185,8 @@ def contenders(stage: Stage) -> list[Contender]:
     return found
 
 
-def drawer(rig: Rig) -> Callable[[], float]:
-    """Return a function that draws once into a viewport and tells the CPU seconds."""
+def drawer(rig: Rig, pixels: int = PIXELS) -> Callable[[], float]:
+    """Return a function that draws once into a viewport, so large, and tells the CPU seconds."""
     import gpu  # late: only Blender 5.2 can draw without a window
 
     gpu.init()
@@ -196,10 +196,10 @@ def drawer(rig: Rig) -> Callable[[], float]:
     space.shading.type = "RENDERED"
     space.overlay.show_overlays = False
     region = next(region for region in area.regions if region.type == "WINDOW")
-    target = gpu.types.GPUOffScreen(PIXELS, PIXELS, format="RGBA16F")
+    target = gpu.types.GPUOffScreen(pixels, pixels, format="RGBA16F")
     view = rig.camera.matrix_world.inverted()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    lens = rig.camera.calc_matrix_camera(depsgraph, x=PIXELS, y=PIXELS)
+    lens = rig.camera.calc_matrix_camera(depsgraph, x=pixels, y=pixels)
     turns = itertools.count()
 
     def draw() -> float:

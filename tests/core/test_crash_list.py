@@ -322,7 +322,7 @@ def work(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", list(CASES))
-def test_no_crash_no_hang_no_nonsense(name: str) -> None:
+def test_no_crash_no_hang_no_nonsense(name: str, record_property) -> None:
     done = subprocess.run(
         # A warning on the console is what a programmer should see, not an artist.
         [sys.executable, "-X", "faulthandler", "-W", "error", __file__, name],
@@ -334,6 +334,7 @@ def test_no_crash_no_hang_no_nonsense(name: str) -> None:
     )
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
+    record_property("outcome", told.get("refusal") or f"median κ {told['median']:.3g}")
     expected = CASES[name][1]
     if isinstance(expected, str):
         text = told["refusal"]

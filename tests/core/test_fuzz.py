@@ -173,7 +173,7 @@ def work(seed: int, count: int) -> None:
     print(json.dumps(tally))
 
 
-def test_random_meshes() -> None:
+def test_random_meshes(record_property) -> None:
     done = subprocess.run(
         [sys.executable, "-X", "faulthandler", __file__, str(SEED), str(COUNT)],
         capture_output=True,
@@ -185,6 +185,7 @@ def test_random_meshes() -> None:
     last = done.stdout.rstrip().rpartition("\n")[2]
     assert done.returncode == 0, f"mesh {last} of seed {SEED}: {done.stderr}"
     tally = json.loads(last)
+    record_property("tally", ", ".join(f"{count} {what}" for what, count in tally.items()))
     assert set(tally) == {"fine", "refused"}, done.stderr
     assert sum(tally.values()) == COUNT
     # A fuzzer that is only ever refused finds nothing.

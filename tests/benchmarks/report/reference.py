@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Path-traced references: two denoised pictures of different seeds, kept on disk."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .metrics import Mask, rmse
+from .scenes import Stage
+from .settings import SEED
+
+Array = NDArray[np.float64]
+VERSION = 1
+"""Raise it when a scene, a shape or a light of scenes.py changes."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The mean of two pictures, and the two."""
+
+    pictures: tuple[Array, Array]
+    seconds: float
+
+    @property
+    def picture(self) -> Array:
+        """What contenders are compared with."""
+        return np.asarray((self.pictures[0] + self.pictures[1]) / 2.0)
+
+    def floor(self, mask: Mask) -> float:
+        """Monte-Carlo error of the mean, RMSE: half of what the two are apart."""
+        return rmse(*self.pictures, mask) / 2.0
+
+
+def kept(folder: Path, key: object, make: Callable[[], Array]) -> tuple[Array, float]:
+    """Take a picture from the cache, or make it; also the seconds it took."""
+    text = json.dumps([VERSION, bpy.app.version_string, key], sort_keys=True)
+    path = folder / f"{hashlib.blake2b(text.encode(), digest_size=12).hexdigest()}.npz"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        start = time.perf_counter()
+        picture = make()
+        part = path.with_suffix(".part.npz")
+        np.savez_compressed(
+            part, picture=picture.astype(np.float32), seconds=time.perf_counter() - start
+        )
+        part.replace(path)
+    with np.load(path) as file:
+        return file["picture"].astype(np.float64), float(file["seconds"])
+
+
+def reference(stage: Stage, bounces: int = 0) -> Reference:
+    """Path-trace a stage in its scattering material, or take it from the cache."""
+    settings = stage.settings
+    stage.wear(stage.wax)
+    pictures, seconds = [], 0.0
+    for seed in (SEED, SEED + 1):
+        key = [asdict(stage.cell), stage.size, settings.samples, settings.level, seed, bounces]
+
+        def render(seed: int = seed) -> Array:
+            return stage.cycles(settings.samples, seed, denoise=True, bounces=bounces)
+
+        picture, took = kept(settings.cache / "references", key, render)
+        pictures.append(picture)
+        seconds += took
+    return Reference((pictures[0], pictures[1]), seconds)

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How large and how fine everything is, and where it goes."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+SEED = 20111106
+"""Of everything random; the second picture of a reference takes the next number."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One way of running the report.
+
+    Attributes:
+        docs: Folder of the pages; pictures and raw results go to `report` in it.
+        cache: References and path-traced spheres, by their parameters.
+        size: Pixels of the matrix, each way.
+        large: Pixels of the pictures of the paper's figures.
+        samples: Paths through a pixel in each of the two pictures of a reference.
+        film: EEVEE samples where nothing else is said.
+        level: Subdivisions of the shapes.
+        atlas: Texels of texture blurring, each way.
+        quality: Of measured spheres (cdrf_addon/measure.py).
+        timed: EEVEE samples that are timed, then Cycles'.
+        rounds: Times that each timing is repeated.
+        sample: Whether this is the quick sample.
+    """
+
+    docs: Path
+    cache: Path
+    size: int = 128
+    large: int = 256
+    samples: int = 512
+    film: int = 16
+    level: int = 2
+    atlas: int = 512
+    quality: str = "default"
+    timed: tuple[tuple[int, ...], tuple[int, ...]] = ((1, 9, 25), (1, 5, 13))
+    rounds: int = 5
+    sample: bool = False
+
+    @property
+    def data(self) -> Path:
+        """Folder of pictures and raw results."""
+        return self.docs / "report"
+
+    def read(self, name: str) -> dict[str, Any]:
+        """Raw results of a stage; empty if it has not run."""
+        path = self.data / f"{name}.json"
+        found: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
+        return found
+
+    def write(self, name: str, results: dict[str, Any]) -> None:
+        """Keep the raw results of a stage, dated."""
+        self.data.mkdir(parents=True, exist_ok=True)
+        results["date"] = time.strftime("%Y-%m-%d")
+        text = json.dumps(rounded(results), indent=1, sort_keys=True, ensure_ascii=False)
+        path = self.data / f"{name}.json"
+        # In one step: a run that is stopped must leave what it had.
+        part = path.with_suffix(".part")
+        part.write_text(text + "\n", encoding="utf-8")
+        part.replace(path)
+
+
+def rounded(value: Any) -> Any:
+    """Keep six digits of every number."""
+    if isinstance(value, dict):
+        return {str(key): rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(item) for item in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def full(docs: Path, cache: Path) -> Settings:
+    """Everything that the page needs."""
+    return Settings(docs, cache)
+
+
+def quick(docs: Path, cache: Path) -> Settings:
+    """A sample of everything, for the tests."""
+    return Settings(
+        docs,
+        cache,
+        size=48,
+        large=64,
+        samples=32,
+        film=4,
+        level=1,
+        atlas=96,
+        quality="preview",
+        timed=((1, 5), (1, 3)),
+        rounds=1,
+        sample=True,
+    )
