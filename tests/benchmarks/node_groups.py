@@ -178,7 +178,7 @@ def contenders(stage: Stage) -> list[Contender]:
     found += [Contender("Diffuse", diffuse, n, True) for n in SHADOWED]
     found += [Contender("Principled, subsurface", scatter, n) for n in (1, 4)]
     found += [stage.skin(n, ratio) for n in COUNTS for ratio in (GREY, SKIN)]
-    found += [stage.skin(n, SKIN, model="PROFILE") for n in (1, 4)]
+    found += [stage.skin(n, GREY, model="PROFILE") for n in (1, 4)]
     found.append(stage.skin(0, SKIN))
     found += [stage.skin(n, SKIN, shadows=True) for n in SHADOWED]
     found += [stage.skin(n, SKIN, shadows=True, edges=True) for n in (1, 3)]
