@@ -19,6 +19,7 @@ import bpy
 
 from .. import ids
 from ..compat import INSTANCER_LINKS
+from .instances import is_instance
 
 Paths = dict[str, str | tuple[bpy.types.ID, str]]
 """What each name of a driver's expression stands for; see `drive`."""
@@ -161,11 +162,6 @@ def nested_instances(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
             for lamp in part.instance_collection.all_objects
         )
     ]
-
-
-def is_instance(item: bpy.types.Object) -> bool:
-    """Tell whether an object is an empty that instances a collection."""
-    return item.instance_type == "COLLECTION" and item.instance_collection is not None
 
 
 def _scene_light(lamp: bpy.types.Object, instance: bpy.types.Object | None = None) -> SceneLight:

@@ -13,7 +13,8 @@ from dataclasses import replace
 import bpy
 
 from .. import ids
-from .lights import SceneLight, is_instance
+from .instances import is_instance
+from .lights import SceneLight
 from .materials import cdrf_node
 from .shader import light_bits
 from .skin_lights import lights_on_skin

@@ -38,8 +38,8 @@ from ..core.summary import (
 )
 from . import display, gloss, linking, reflectance_models, shader, shadows, state, world
 from .image import adopt_table
-from .instances import shown_objects
-from .lights import MOST_FLAGS, SceneLight, is_instance, nested_instances
+from .instances import is_instance, shown_objects
+from .lights import MOST_FLAGS, SceneLight, nested_instances
 from .materials import cdrf_node, install, is_mapped, require_editable
 from .mesh_io import (
     Shape,

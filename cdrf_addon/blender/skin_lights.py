@@ -17,10 +17,7 @@ from .. import ids
 from .instances import shown_objects
 from .lights import SceneLight, scene_lights
 from .materials import cdrf_node
-from .shader import wired_lights
-
-Source = tuple[bpy.types.Object, bpy.types.Object | None]
-"""See `SceneLight.source`."""
+from .shader import Source, wired_lights
 
 
 def _shows(

@@ -55,13 +55,18 @@ def scene_of(rig: Rig, count: int) -> tuple[bpy.types.Object, bpy.types.Object]:
     # What the camera sees of it must not hide the sphere.
     bar.visible_camera = False
     ball = rig.sphere(subdivisions=6)
+    make_white_skin(ball, SIGMA)
+    return ball, bar
+
+
+def make_white_skin(item: bpy.types.Object, sigma0: float) -> None:
+    """Set up the selected object, white and without coloured edges."""
     bpy.context.view_layer.update()
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    material = ball.data.materials[0]
+    material = item.data.materials[0]
     material.cdrf.shadow_edges = False
-    material.cdrf.sigma0 = SIGMA
-    cdrf_node(ball).inputs["Base Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    return ball, bar
+    material.cdrf.sigma0 = sigma0
+    cdrf_node(item).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
 
 
 def points() -> tuple[Array, NDArray[np.bool_]]:
@@ -201,12 +206,7 @@ def bald_head(rig: Rig, count: int) -> bpy.types.Object:
     """A unit sphere under the first HAT_SUNS, translucent before it has a hat."""
     light_from(rig, directions(count, HAT_SUNS))
     head = rig.sphere(subdivisions=6)
-    bpy.context.view_layer.update()
-    assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    material = head.data.materials[0]
-    material.cdrf.shadow_edges = False
-    material.cdrf.sigma0 = HAT_SIGMA
-    cdrf_node(head).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
+    make_white_skin(head, HAT_SIGMA)
     return head
 
 

@@ -221,17 +221,9 @@ def _nodes(settings: Settings) -> dict[str, dict[str, int]]:
             if name == "grey":
                 make.cdrf.sigma0_ratio = (1.0, 1.0, 1.0)
             tree = make.node_tree.nodes[ids.NODE].node_tree
-            found[name] = {"nodes": len(kinds(tree)), "look-ups": _look_ups(tree)}
+            inside = kinds(tree)
+            found[name] = {"nodes": len(inside), "look-ups": inside.count("TEX_IMAGE")}
     return found
-
-
-def _look_ups(tree: bpy.types.ShaderNodeTree) -> int:
-    total = 0
-    for node in tree.nodes:
-        if node.type == "GROUP":
-            total += _look_ups(node.node_tree)
-        total += node.type == "TEX_IMAGE"
-    return total
 
 
 def _arithmetic(settings: Settings) -> dict[str, Any]:
