@@ -67,9 +67,10 @@ def main() -> None:
         if "errors" in stages:
             matrix.measure(here, chosen.cells, chosen.contenders,
                            missing=chosen.missing, deadline=deadline)  # fmt: skip
-            known = here.read("errors").get("bounces")
-            if not (chosen.missing and known) and time.monotonic() < deadline:
-                matrix.bounces(here)
+            for name, extra in matrix.EXTRAS.items():
+                known = here.read("errors").get(name)
+                if not (chosen.missing and known) and time.monotonic() < deadline:
+                    extra(here)
         if "paper" in stages and time.monotonic() < deadline:
             paper.run(here, missing=chosen.missing)
         if "timing" in stages:

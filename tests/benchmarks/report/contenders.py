@@ -8,7 +8,7 @@ samples. The extension is used through its operators and properties alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -132,10 +132,10 @@ def cdrf(
     else:
         assert bpy.ops.cdrf.set_model(model=model) == {"FINISHED"}
     bpy.context.view_layer.update()
-    if not raw:
-        yield stage.eevee
-        return
-    with _raw_curvature(stage.item.data):
+    with (
+        nullcontext() if shadows else stage.without_shadows(),
+        _raw_curvature(stage.item.data) if raw else nullcontext(),
+    ):
         yield stage.eevee
 
 
@@ -294,11 +294,26 @@ QUICK = {LAMBERT, DEFAULT, TEXTURE, PATHS}
 QUICK_SAMPLES = {PATHS: (1, 8)}
 
 
-def chosen(*, sample: bool) -> list[tuple[Contender, tuple[int, ...]]]:
-    """Contenders with the samples at which they are measured; none stands for EEVEE's default."""
+SURVEY_SAMPLES = {PATHS: (1, 4, 16, 64, 256)}
+SURVEY_LACKS = {"CDRF sphere, coloured shadow edges", NODE}
+"""A survey leaves out what takes longest; EEVEE's node is in it as the Principled BSDF."""
+
+
+def chosen(
+    *, sample: bool = False, survey: bool = False
+) -> list[tuple[Contender, tuple[int, ...]]]:
+    """Contenders with the samples at which they are measured; none stands for EEVEE's default.
+
+    Args:
+        sample: Those of the report's sample.
+        survey: Those of the scenes that are not among the first (scenes.py).
+    """
     if sample:
         return [(one, QUICK_SAMPLES.get(one.name, one.samples))
                 for one in CONTENDERS if one.name in QUICK]  # fmt: skip
+    if survey:
+        return [(one, SURVEY_SAMPLES.get(one.name, one.samples))
+                for one in CONTENDERS if one.name not in SURVEY_LACKS]  # fmt: skip
     return [(one, one.samples) for one in CONTENDERS]
 
 

@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,17 @@ from PIL import Image
 
 from cdrf_addon.core.models import ring, sphere
 
-from .contenders import CONTENDERS, DEFAULT, LAMBERT, NODE, PATHS, PRINCIPLED, SHADOWS, TEXTURE
+from .contenders import (
+    CONTENDERS,
+    DEFAULT,
+    EEVEE,
+    LAMBERT,
+    NODE,
+    PATHS,
+    PRINCIPLED,
+    SHADOWS,
+    TEXTURE,
+)
 from .matrix import load_pictures, measured_cells, pictures_path, wanted_cells
 from .metrics import displayed
 from .paper import stored
@@ -217,67 +228,101 @@ def cell_pictures(settings: Settings) -> None:
                 picture(rows[1][column], off, f"× {DIFFERENCE:g} difference")
 
 
-def _points(
-    cell: Mapping[str, Any], timing: dict[str, Any], mask: str
-) -> Iterator[tuple[str, str, float, float]]:
-    """Name, family, seconds a frame and error of what was measured and timed."""
-    family = {one.name: one.family for one in CONTENDERS}
+@dataclass(frozen=True)
+class Point:
+    """A contender at some samples in the plot of error against time."""
+
+    name: str
+    engine: str
+    family: str
+    samples: int
+    seconds: float
+    error: float
+
+
+def points(cell: Mapping[str, Any], timing: dict[str, Any], mask: str) -> Iterator[Point]:
+    """What was both measured in a cell and timed."""
+    known = {one.name: one for one in CONTENDERS}
     for name, row in cell["contenders"].items():
-        base = name if name in family else name.rsplit(", ", 1)[0]
-        if "missing" in row or base not in family:
+        base = name if name in known else name.rsplit(", ", 1)[0]
+        if "missing" in row or base not in known:
             continue
         seconds = frame_seconds(timing, base, row["samples"])
         if math.isfinite(seconds):
-            yield name, family[base], seconds, row["rmse"][mask]
+            one = known[base]
+            yield Point(name, one.engine, one.family, row["samples"], seconds, row["rmse"][mask])
 
 
-def front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Points that none is both quicker and closer than, by rising time."""
+def at_equal_samples(found: Sequence[Point]) -> list[Point]:
+    """EEVEE's frames with its usual samples: only its own node was rendered with others too."""
+    usual = Settings.film
+    own = [one for one in found if one.engine == EEVEE]
+    return [one for one in own if one.samples == usual] or own
+
+
+def front(found: Sequence[Point]) -> list[Point]:
+    """Those that none is both quicker and closer than, by rising time."""
     best, kept = math.inf, []
-    for cost, error in sorted(points):
-        if error < best:
-            best = error
-            kept.append((cost, error))
+    for one in sorted(found, key=lambda one: (one.seconds, one.error)):
+        if one.error < best:
+            best = one.error
+            kept.append(one)
     return kept
 
 
-def pareto(settings: Settings, most: int = 6) -> list[str]:
-    """Error against time of a frame, log-log; names of the cells drawn."""
+def plotted(settings: Settings, most: int = 6) -> dict[str, list[Point]]:
+    """Points of the cells that are in the plot of error against time: those of the timed lights."""
     timing = settings.read("timing")
+    lights = str(timing.get("frames", {}).get("cell", "")).rpartition(", ")[2]
     cells = {
-        name: cell
+        name: list(points(cell, timing, "all"))
         for name, cell in measured_cells(settings).items()
-        if list(_points(cell, timing, "all"))
+        if name.endswith(f", {lights}")
     }
-    names = list(cells)[:most]
+    return dict([(name, found) for name, found in cells.items() if found][:most])
+
+
+def pareto(settings: Settings) -> None:
+    """Error against time of a frame, log-log."""
+    cells = plotted(settings)
+    names = list(cells)
     if not names:
-        return []
+        return
+    floors = measured_cells(settings)
     columns = min(3, len(names))
     rows = math.ceil(len(names) / columns)
     with figure(settings.data / "pareto.svg", 4.2 * columns, 3.4 * rows) as sheet:
         grid = np.atleast_1d(sheet.subplots(rows, columns, squeeze=False)).ravel()
         seen: dict[str, Any] = {}
         for axes, name in zip(grid, names, strict=False):
-            _pareto_panel(axes, name, cells[name], timing, seen)
+            _pareto_panel(axes, name, cells[name], floors[name]["floor"]["all"], seen)
         for axes in grid[len(names) :]:
             axes.set_axis_off()
         sheet.legend(seen.values(), seen.keys(), loc="outside lower center", ncols=5, fontsize=8)
-    return names
 
 
 def _pareto_panel(
-    axes: Axes, name: str, cell: Mapping[str, Any], timing: dict[str, Any], seen: dict[str, Any]
+    axes: Axes, name: str, found: Sequence[Point], floor: float, seen: dict[str, Any]
 ) -> None:
-    points = list(_points(cell, timing, "all"))
-    for _, family, seconds, error in points:
-        marker = "s" if family == "Texture blurring" else "o"
-        dots = axes.scatter(seconds, error, s=22, color=COLOURS[family], marker=marker, zorder=3)
-        seen.setdefault(family, dots)
-    best = front([(seconds, error) for *_, seconds, error in points])
-    (line,) = axes.plot(*zip(*best, strict=True), color="#c03030", lw=1.0, drawstyle="steps-post")
-    seen.setdefault("Pareto front", line)
-    floor = axes.axhline(cell["floor"]["all"], color="#1a1a1e", lw=0.8, ls=":")
-    seen.setdefault("noise of the reference", floor)
+    for one in found:
+        marker = "s" if one.family == "Texture blurring" else "o"
+        dots = axes.scatter(
+            one.seconds, one.error, s=22, color=COLOURS[one.family], marker=marker, zorder=3
+        )
+        seen.setdefault(one.family, dots)
+    for label, some, style in (
+        ("Pareto front", found, "-"),
+        ("of EEVEE's frames", at_equal_samples(found), "--"),
+    ):
+        best = [(one.seconds, one.error) for one in front(some)]
+        if not best:
+            continue
+        (line,) = axes.plot(
+            *zip(*best, strict=True), style, color="#c03030", lw=1.0, drawstyle="steps-post"
+        )
+        seen.setdefault(label, line)
+    line = axes.axhline(floor, color="#1a1a1e", lw=0.8, ls=":")
+    seen.setdefault("noise of the reference", line)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_title(name, fontsize=9)
@@ -295,7 +340,8 @@ def preparation_plot(settings: Settings) -> bool:
     with figure(settings.data / "preparation.svg", 5.2, 3.6) as sheet:
         axes = sheet.subplots()
         for one in CONTENDERS:
-            row = cells[name]["contenders"].get(one.name)
+            rows = cells[name]["contenders"]
+            row = rows.get(one.name) or rows.get(f"{one.name}, {settings.film}")
             if row is None or "missing" in row or one.name not in spent:
                 continue
             axes.scatter(
@@ -341,7 +387,7 @@ def scaling_plot(settings: Settings) -> bool:
     parts = [
         (name, label)
         for name, label in (
-            ("pixels", "pixels each way"),
+            ("pixels", "pixels"),
             ("lights", "suns"),
             ("vertices", "vertices"),
         )
@@ -356,11 +402,12 @@ def scaling_plot(settings: Settings) -> bool:
         ):
             for name, rows in timing[part]["rows"].items():
                 sizes = sorted(int(size) for size in rows if size.isdigit())
+                counts = [size**2 if part == "pixels" else size for size in sizes]
                 middle = [spread(one["wall"] for one in rows[str(size)]) for size in sizes]
                 values, low, high = np.array(middle).T
                 colour = COLOURS.get(family.get(name, ""), "#c03030")
                 axes.errorbar(
-                    sizes,
+                    counts,
                     values,
                     (values - low, high - values),
                     color=colour,
@@ -373,7 +420,7 @@ def scaling_plot(settings: Settings) -> bool:
             axes.set_xscale("log", base=2 if part != "vertices" else 10)
             axes.set_yscale("log")
             axes.set_xlabel(label)
-            axes.set_ylabel("seconds a draw")
+            axes.set_ylabel("seconds a draw, no shadows")
             axes.legend(fontsize=6)
     return True
 

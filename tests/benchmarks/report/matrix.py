@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,18 @@ from machine import machine
 from numpy.typing import NDArray
 from run import peak_megabytes, reset_peak
 
-from .contenders import Contender, chosen, row_name
+from .contenders import (
+    CONTENDERS,
+    DEFAULT,
+    LAMBERT,
+    PRINCIPLED,
+    Contender,
+    chosen,
+    row_name,
+)
 from .metrics import rmse, ssim
 from .reference import Reference, reference
-from .scenes import CELLS, Cell, Stage
+from .scenes import CELLS, FIRST, Cell, Stage
 from .settings import Settings
 
 Array = NDArray[np.float64]
@@ -31,6 +39,11 @@ def wanted_cells(settings: Settings, patterns: Sequence[str] = ("*",)) -> list[C
     """Cells to measure, the most telling first."""
     cells = SAMPLE_CELLS if settings.sample else CELLS
     return [cell for cell in cells if any(fnmatch(cell.name, one) for one in patterns)]
+
+
+def contenders_of(settings: Settings, cell: Cell) -> list[tuple[Contender, tuple[int, ...]]]:
+    """What is measured in a cell, with the samples."""
+    return chosen(sample=settings.sample, survey=cell not in FIRST)
 
 
 def measured_cells(settings: Settings) -> dict[str, Any]:
@@ -69,11 +82,11 @@ def measure(
     results["settings"] = {name: getattr(settings, name) for name in
                            ("size", "samples", "film", "level", "atlas")}  # fmt: skip
     cells = results.setdefault("cells", {})
-    names = [one for one in chosen(sample=settings.sample)
-             if any(fnmatch(one[0].name, pattern) for pattern in contenders)]  # fmt: skip
     for cell in wanted_cells(settings, patterns):
         known = cells.setdefault(cell.name, {"contenders": {}})
-        todo = [one for one in names if not (missing and _complete(known, *one))]
+        todo = [one for one in contenders_of(settings, cell)
+                if any(fnmatch(one[0].name, pattern) for pattern in contenders)
+                and not (missing and _complete(known, *one))]  # fmt: skip
         if not todo or time.monotonic() > deadline:
             continue
         _measure_cell(settings, cell, known, todo, deadline, results)
@@ -188,3 +201,28 @@ def bounces(settings: Settings) -> None:
                  for name, mask in masks.items()},
     }  # fmt: skip
     settings.write("errors", results)
+
+
+def sun_taken_out(settings: Settings) -> None:
+    """What Blender's default of taking a sun out of a world's picture does to EEVEE's frames."""
+    cell = Cell("sphere" if settings.sample else "head", "skin", "HDRI")
+    stage = Stage(cell, settings)
+    truth = reference(stage)
+    masks = stage.masks(truth.pictures)
+    world = stage.scene.world
+    found: dict[str, list[float]] = {}
+    for threshold in (0.0, type(world).bl_rna.properties["sun_threshold"].default):
+        world.sun_threshold = threshold
+        for contender in (one for one in CONTENDERS if one.name in (LAMBERT, PRINCIPLED, DEFAULT)):
+            rows = run(stage, contender, (settings.film,), truth.picture, masks)
+            found.setdefault(contender.name, []).append(rows[settings.film][0]["rmse"]["all"])
+    results = settings.read("errors")
+    results["sun taken out"] = {"cell": cell.name, "rmse": found}
+    settings.write("errors", results)
+
+
+EXTRAS: dict[str, Callable[[Settings], None]] = {
+    "bounces": bounces,
+    "sun taken out": sun_taken_out,
+}
+"""What is measured in one scene to put the others in their place."""

@@ -28,8 +28,9 @@ from node_groups import kinds
 from . import texture_blurring
 from .contenders import cdrf, lighting
 from .matrix import keep_pictures, load_pictures, pictures_path
+from .metrics import rmse
 from .reference import kept
-from .scenes import Cell, Stage, directions
+from .scenes import COVERED, Cell, Stage, directions
 from .settings import SEED, Settings
 from .substances import profile_of
 
@@ -115,7 +116,7 @@ def _figure_1_and_3(settings: Settings) -> dict[str, Any]:
     coarse = Stage(HEAD, replace(settings, level=0), settings.large)
     pictures = {"mesh": _wireframe(coarse)}
     stage = Stage(HEAD, settings, settings.large)
-    pictures["Path tracing"] = path_traced(stage, settings.samples // 2)
+    pictures["Path tracing"] = path_traced(stage, settings.samples // 4)
     pictures["curvature"] = curvature_picture(stage)
     known = stage.item.data.cdrf
     stage.wear(stage.opaque)
@@ -188,7 +189,7 @@ def _figure_2(settings: Settings) -> dict[str, Any]:
 
 def _figure_4(settings: Settings) -> dict[str, Any]:
     stage = Stage(STATUE, settings, settings.large)
-    pictures = {"Path tracing": path_traced(stage, settings.samples // 2)}
+    pictures = {"Path tracing": path_traced(stage, settings.samples // 4)}
     stage.wear(stage.opaque)
     pictures["Lambert"] = stage.eevee(settings.film)
     for name, arguments in (
@@ -198,7 +199,12 @@ def _figure_4(settings: Settings) -> dict[str, Any]:
         with cdrf(stage, **arguments) as render:
             pictures[name] = render(settings.film)
     _store(settings, "figure4", pictures)
-    return {"millimetres": stage.millimetres}
+    truth = pictures.pop("Path tracing")
+    covered = np.all([one[..., 3] > COVERED for one in (truth, *pictures.values())], axis=0)
+    return {
+        "millimetres": stage.millimetres,
+        "rmse": {name: rmse(one, truth, covered) for name, one in pictures.items()},
+    }
 
 
 # --- section 5 -----------------------------------------------------------------------------------
@@ -297,7 +303,7 @@ def _without_uv(settings: Settings) -> dict[str, Any]:
     stage.wear(stage.opaque)
     with stage.without_shadows():
         hard = stage.eevee(1)
-    covered = (soft[..., 3] > 0.999) & (hard[..., 3] > 0.999)
+    covered = (soft[..., 3] > COVERED) & (hard[..., 3] > COVERED)
     dark = covered & (hard[..., :3].max(axis=-1) <= 1e-4)
     return {"uv maps": len(mesh.uv_layers), "light behind the terminator":
             float(soft[..., :3].max(axis=-1)[dark].max()) if dark.any() else 0.0}  # fmt: skip

@@ -35,7 +35,7 @@ class Settings:
     docs: Path
     cache: Path
     size: int = 128
-    large: int = 256
+    large: int = 512
     samples: int = 512
     film: int = 16
     level: int = 2

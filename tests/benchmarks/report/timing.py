@@ -2,8 +2,8 @@
 """What a frame costs. Run it when the machine is quiet: `--timing`.
 
 Everything is interleaved: in each round every contender has its turn, so that a drift of the
-machine meets all alike, and what is told is the ratio within a round. Each round is kept as it is
-done; a run that was broken off goes on where it stopped.
+machine meets all alike, and what is told is the ratio within a round. Each measurement is kept as
+it is done; a run that was broken off goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ import itertools
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import bpy
@@ -21,6 +24,8 @@ from machine import machine
 from run import mesh_of, peak_megabytes, reset_peak
 from surfaces import ALL_SURFACES
 
+from cdrf_addon.measure import Request
+from cdrf_addon.measure import measure as measure_spheres
 from node_groups import drawer
 
 from .contenders import (
@@ -36,7 +41,6 @@ from .contenders import (
     SHADOWS,
     TEXTURE,
     Contender,
-    cdrf,
 )
 from .scenes import Cell, Stage
 from .settings import SEED, Settings
@@ -55,7 +59,7 @@ LIGHTS = (1, 2, 4, 8)
 VERTICES = (2_000, 20_000, 200_000)
 QUICK_SIZES = {"pixels": (64, 128), "lights": (1,), "vertices": (2_000,)}
 SIZES = {"pixels": PIXELS, "lights": LIGHTS, "vertices": VERTICES}
-DRAWN = 256
+DRAWN = 512
 
 Spent = dict[str, float]
 
@@ -97,7 +101,8 @@ def run(settings: Settings, rounds: int, parts: Sequence[str], deadline: float) 
         known = results.setdefault(name, {"rounds": 0, "rows": {}})
         while known["rounds"] < rounds and time.monotonic() < deadline:
             print(f"{name}: round {known['rounds'] + 1} of {rounds}", flush=True)
-            PARTS[name](settings, known)
+            for _ in PARTS[name](settings, known):
+                settings.write("timing", results)
             known["rounds"] += 1
             settings.write("timing", results)
 
@@ -108,44 +113,51 @@ def forget(settings: Settings, parts: Sequence[str]) -> None:
     settings.write("timing", {name: part for name, part in results.items() if name not in parts})
 
 
-def _keep(known: dict[str, Any], name: str, point: object, spent: Spent) -> None:
-    """Add a round's measurement. A round that was broken off was never written."""
-    known["rows"].setdefault(name, {}).setdefault(str(point), []).append(spent)
+def _keep(known: dict[str, Any], name: str, spent: dict[str, Spent]) -> None:
+    """Add a contender's measurements of this round, all at once."""
+    for point, one in spent.items():
+        known["rows"].setdefault(name, {}).setdefault(point, []).append(one)
 
 
-def frames(settings: Settings, known: dict[str, Any]) -> None:
+def _due(known: dict[str, Any], name: str, point: object) -> bool:
+    """Tell whether a measurement of this round is still to be done."""
+    return len(known["rows"].get(name, {}).get(str(point), [])) <= known["rounds"]
+
+
+def frames(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
     """Final renders at several numbers of samples, after one that is thrown away."""
     cell = Cell("sphere", "skin", "sun") if settings.sample else CELL
     stage = Stage(cell, settings)
     known["cell"], known["size"] = cell.name, settings.size
     for contender in by_name(TIMED_QUICK if settings.sample else TIMED):
+        if not _due(known, contender.name, "first"):
+            continue
         few, many = settings.timed
         counts = {EEVEE: few, CYCLES: many, NUMPY: (1,)}[contender.engine]
         with contender.ready(stage) as render:
-            first = timed(lambda render=render: render(1))  # type: ignore[misc]
-            _keep(known, contender.name, "first", first)
-            for count in counts:
-                spent = timed(lambda render=render, count=count: render(count))  # type: ignore[misc]
-                _keep(known, contender.name, count, spent)
+            spent = {"first": timed(partial(render, 1))}
+            spent |= {str(count): timed(partial(render, count)) for count in counts}
+        _keep(known, contender.name, spent)
+        yield
 
 
-def draws(settings: Settings, known: dict[str, Any]) -> None:
+def draws(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
     """Viewport draws of one sample: steadier than renders, and what an artist works in."""
     stage = Stage(Cell("sphere", "skin", "sun") if settings.sample else CELL, settings)
     known["cell"], known["size"] = stage.cell.name, 64 if settings.sample else DRAWN
     draw = drawer(stage.rig, known["size"])
-    wanted = by_name(TIMED_QUICK if settings.sample else TIMED)
-    for contender in wanted:
-        if contender.engine != EEVEE:
-            continue
-        with contender.ready(stage):
-            _draw_twice(known, contender.name, "draw", draw)
+    for contender in by_name(TIMED_QUICK if settings.sample else TIMED):
+        if contender.engine == EEVEE and _due(known, contender.name, "draw"):
+            with contender.ready(stage):
+                _keep(known, contender.name, _drawn("draw", draw))
+            yield
 
 
-def _draw_twice(known: dict[str, Any], name: str, point: object, draw: Callable[[], float]) -> None:
-    _keep(known, name, f"first {point}", timed(draw))
+def _drawn(point: object, draw: Callable[[], float]) -> dict[str, Spent]:
+    """The first draw, and the quickest of the next three."""
+    first = timed(draw)
     spent = [timed(draw) for _ in range(3)]
-    _keep(known, name, point, min(spent, key=lambda one: one["wall"]))
+    return {f"first {point}": first, str(point): min(spent, key=lambda one: one["wall"])}
 
 
 def _sizes(settings: Settings, name: str) -> tuple[int, ...]:
@@ -156,21 +168,21 @@ def _scaled(settings: Settings) -> list[Contender]:
     return by_name(TIMED_QUICK if settings.sample else SCALED)
 
 
-def pixels(settings: Settings, known: dict[str, Any]) -> None:
-    """Draws of growing pictures."""
+def pixels(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
+    """Draws of growing pictures, without shadows."""
     stage = Stage(Cell("sphere", "skin", "sun"), settings)
     for contender in _scaled(settings):
-        with contender.ready(stage):
+        with contender.ready(stage), stage.without_shadows():
             for size in _sizes(settings, "pixels"):
-                _draw_twice(known, contender.name, size, drawer(stage.rig, size))
+                if _due(known, contender.name, size):
+                    _keep(known, contender.name, _drawn(size, drawer(stage.rig, size)))
+                    yield
 
 
-def lights(settings: Settings, known: dict[str, Any]) -> None:
-    """Draws under more and more suns that cast no shadows."""
+def lights(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
+    """Draws under more and more suns, without shadows."""
     stage = Stage(Cell("torus", "skin", "sun"), settings)
     draw = drawer(stage.rig, DRAWN)
-    for light in stage.lights:
-        light.data.use_shadow = False
     for count in _sizes(settings, "lights"):
         for number in range(len(stage.lights), count):
             turn = (0.5 + 0.3 * number, 0.0, 1.7 * number)
@@ -178,14 +190,14 @@ def lights(settings: Settings, known: dict[str, Any]) -> None:
             sun = stage.rig.light("SUN", name=f"Sun {number}", energy=energy, rotation=turn)
             sun.data.angle = 0.0
         for contender in _scaled(settings):
-            with contender.ready(stage):
-                for light in stage.lights:
-                    light.data.use_shadow = False
-                _draw_twice(known, contender.name, count, draw)
+            if _due(known, contender.name, count):
+                with contender.ready(stage), stage.without_shadows():
+                    _keep(known, contender.name, _drawn(count, draw))
+                yield
 
 
-def vertices(settings: Settings, known: dict[str, Any]) -> None:
-    """Draws of, and preparation for, finer and finer meshes."""
+def vertices(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
+    """Draws of, and preparation for, finer and finer meshes; without shadows."""
     for size in _sizes(settings, "vertices"):
         stage = Stage(Cell("torus", "skin", "sun"), settings)
         draw = drawer(stage.rig, DRAWN)
@@ -193,33 +205,34 @@ def vertices(settings: Settings, known: dict[str, Any]) -> None:
         stage.item.data.shade_smooth()
         stage.wear(stage.wax)
         spent = timed(bpy.ops.cdrf.setup)
-        _keep(known, "Make Translucent", size, spent)
+        if _due(known, "Make Translucent", size):
+            _keep(known, "Make Translucent", {str(size): spent})
         for contender in _scaled(settings):
-            with contender.ready(stage):
-                _draw_twice(known, contender.name, size, draw)
+            if _due(known, contender.name, size):
+                with contender.ready(stage), stage.without_shadows():
+                    _keep(known, contender.name, _drawn(size, draw))
+                yield
 
 
-def preparation(settings: Settings, known: dict[str, Any]) -> None:
+def preparation(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
     """What comes before the first frame of an untouched object."""
     stage = Stage(Cell("sphere", "skin", "sun") if settings.sample else CELL, settings)
     known["cell"], known["vertices"] = stage.cell.name, len(stage.item.data.vertices)
-    _keep(known, DEFAULT, "setup", timed(bpy.ops.cdrf.setup))
-    for model in ("RING", "PROFILE"):
-
-        def choose(model: str = model) -> None:
-            with cdrf(stage, model):
-                pass
-
-        _keep(known, f"CDRF {model.lower()}", "model", timed(choose))
-    if not settings.sample:
-        # Another seed each time: what was measured once is kept and costs nothing.
-        seed = SEED + 1 + known["rounds"]
-        quality = settings.quality
-        _keep(known, "CDRF measured", "measure",
-              timed(lambda: bpy.ops.cdrf.measure(quality=quality, seed=seed)))  # fmt: skip
+    setup = timed(bpy.ops.cdrf.setup)
+    if _due(known, DEFAULT, "setup"):
+        _keep(known, DEFAULT, {"setup": setup})
+        yield
+    if not settings.sample and _due(known, "CDRF measured", "measure"):
+        # In a folder of its own: what was measured once is kept and costs nothing.
+        red, green, blue = stage.substance.albedo
+        request = Request((red, green, blue), settings.quality, SEED)
+        with TemporaryDirectory() as folder:
+            measure = partial(measure_spheres, request, Path(folder))
+            _keep(known, "CDRF measured", {"measure": timed(measure)})
+        yield
 
 
-PARTS: dict[str, Callable[[Settings, dict[str, Any]], None]] = {
+PARTS: dict[str, Callable[[Settings, dict[str, Any]], Iterator[None]]] = {
     "draws": draws,
     "frames": frames,
     "preparation": preparation,
@@ -249,10 +262,12 @@ def split(rows: dict[str, list[Spent]], clock: str = "wall") -> list[tuple[float
 
 
 def frame_seconds(timing: dict[str, Any], name: str, samples: int) -> float:
-    """Median time of a frame of so many samples; NaN if it was not timed."""
+    """Median time of a frame: measured, else by its line; NaN if the contender was not timed."""
     rows = timing.get("frames", {}).get("rows", {}).get(name)
     if rows is None:
         return math.nan
+    if str(samples) in rows:
+        return spread(one["wall"] for one in rows[str(samples)])[0]
     return spread(max(fixed + slope * samples, 1e-3) for fixed, slope in split(rows))[0]
 
 
