@@ -320,3 +320,9 @@ def chosen(
 def row_name(name: str, samples: tuple[int, ...], count: int) -> str:
     """Name of a contender at so many samples."""
     return name if len(samples) <= 1 else f"{name}, {count}"
+
+
+def contender_of(row: str) -> Contender | None:
+    """Contender of a row by its name with or without samples; None if it is known no more."""
+    known = {one.name: one for one in CONTENDERS}
+    return known.get(row) or known.get(row.rpartition(", ")[0])

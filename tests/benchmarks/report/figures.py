@@ -30,6 +30,7 @@ from .contenders import (
     PRINCIPLED,
     SHADOWS,
     TEXTURE,
+    contender_of,
 )
 from .matrix import load_pictures, measured_cells, pictures_path, wanted_cells
 from .metrics import displayed
@@ -242,14 +243,12 @@ class Point:
 
 def points(cell: Mapping[str, Any], timing: dict[str, Any], mask: str) -> Iterator[Point]:
     """What was both measured in a cell and timed."""
-    known = {one.name: one for one in CONTENDERS}
     for name, row in cell["contenders"].items():
-        base = name if name in known else name.rsplit(", ", 1)[0]
-        if "missing" in row or base not in known:
+        one = contender_of(name)
+        if "missing" in row or one is None:
             continue
-        seconds = frame_seconds(timing, base, row["samples"])
+        seconds = frame_seconds(timing, one.name, row["samples"])
         if math.isfinite(seconds):
-            one = known[base]
             yield Point(name, one.engine, one.family, row["samples"], seconds, row["rmse"][mask])
 
 

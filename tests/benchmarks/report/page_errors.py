@@ -13,7 +13,7 @@ from .contenders import DEFAULT, LAMBERT, chosen, row_name
 from .matrix import contenders_of, wanted_cells
 from .results import DASH, Results, table
 from .scenes import FIGURINE, FIRST, HEAD, SOFTBOXES, Cell
-from .standings import MAIN, MEASURED, SHORT, Row, best_of, groups, of_eevee, row_of, share
+from .standings import MAIN, MEASURED, SHORT, Row, against, best_of, groups, of_eevee, row_of, share
 from .substances import PRESET_OF
 from .timing import frame_seconds
 
@@ -68,16 +68,12 @@ def _untimed(results: Results) -> str:
 
 def _prepared(results: Results) -> list[str]:
     """What measuring a material, the one long preparation, is worth."""
-    cells = list(results.cells.values())
-    pairs = [(row_of(cell, DEFAULT), row_of(cell, MEASURED)) for cell in cells]
-    both = [(one, other) for one, other in pairs if one and other]
+    closer, alike, both = against(results.cells.values(), MEASURED, DEFAULT)
     if not both:
         return []
-    closer = sum(other["rmse"]["all"] < one["rmse"]["all"] for one, other in both)
-    alike = sum(other["ssim"]["all"] > one["ssim"]["all"] for one, other in both)
     return [
         "Measuring the material, the one preparation that takes long, lowers the RMSE of the "
-        f"default model in {closer} and raises its SSIM in {alike} of {len(both)} scenes.",
+        f"default model in {closer} and raises its SSIM in {alike} of {both} scenes.",
         "",
     ]
 

@@ -33,7 +33,7 @@ def _draws(results: Results) -> list[str]:
         rows.append([name, base_of(name), clock, cpu, f"{middle:.0f}", f"{first:.1f}"])
     return [
         f"**Viewport draws** of one sample, {part['cell']}, {part['size']} pixels each way, "
-        f"{part['rounds']} interleaved rounds; median (10 % to 90 %).",
+        f"{part['rounds']} interleaved rounds; median and spread.",
         "",
         *table(["contender", "against", "ratio, clock", "ratio, CPU", "ms", "first draw, s"], rows),
     ]

@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from .contenders import (
-    CONTENDERS,
     DEFAULT,
     EEVEE,
     LAMBERT,
@@ -20,6 +19,8 @@ from .contenders import (
     PRINCIPLED,
     SHADOWS,
     TEXTURE,
+    Contender,
+    contender_of,
 )
 from .matrix import wanted_cells
 from .results import Results
@@ -60,19 +61,18 @@ def row_of(cell: Row, name: str) -> Row | None:
     return row if "rmse" in row else None
 
 
-def base_name(name: str) -> str:
-    """Contender of a row, without its samples."""
-    known = {one.name for one in CONTENDERS}
-    return name if name in known else name.rpartition(", ")[0]
+def _eevee_rows(cell: Row) -> Iterator[tuple[str, Contender]]:
+    """Rows of a cell that EEVEE has drawn, with their contenders."""
+    for name, row in cell["contenders"].items():
+        one = contender_of(name)
+        if "rmse" in row and one and one.engine == EEVEE:
+            yield name, one
 
 
 def best_of(cell: Row, mask: str = "all", measure: str = "rmse") -> str:
     """EEVEE's frame with the least error, or the highest similarity, of a cell; "" if none."""
-    engine = {one.name: one.engine for one in CONTENDERS}
     rows = cell["contenders"]
-    names = [
-        name for name, row in rows.items() if "rmse" in row and engine.get(base_name(name)) == EEVEE
-    ]
+    names = [name for name, _ in _eevee_rows(cell)]
     if not names:
         return ""
     if measure == "ssim":
@@ -85,6 +85,15 @@ def share(cells: Iterable[Row], name: str, mask: str) -> tuple[float, int]:
     pairs = [(row_of(cell, name), row_of(cell, LAMBERT)) for cell in cells]
     logs = [math.log(one["rmse"][mask] / base["rmse"][mask]) for one, base in pairs if one and base]
     return (math.exp(float(np.mean(logs))), len(logs)) if logs else (math.inf, 0)
+
+
+def against(cells: Iterable[Row], name: str, other: str) -> tuple[int, int, int]:
+    """In how many cells one is closer than another, in how many more alike, of how many."""
+    pairs = [(row_of(cell, name), row_of(cell, other)) for cell in cells]
+    both = [(one, base) for one, base in pairs if one and base]
+    closer = sum(one["rmse"]["all"] < base["rmse"]["all"] for one, base in both)
+    alike = sum(one["ssim"]["all"] > base["ssim"]["all"] for one, base in both)
+    return closer, alike, len(both)
 
 
 def of_eevee(name: str) -> bool:
@@ -100,13 +109,13 @@ def matrix_sentences(results: Results) -> list[str]:
     cells = [cell for cell in results.cells.values() if best_of(cell)]
     if not cells:
         return []
-    family = {one.name: one.family for one in CONTENDERS}
     found = _pairs(cells)
     for measure, words in (
         ("rmse", "least RMSE over all pixels"),
         ("ssim", "highest SSIM"),
     ):
-        wins = Counter(family[base_name(best_of(cell, measure=measure))] for cell in cells)
+        best = (contender_of(best_of(cell, measure=measure)) for cell in cells)
+        wins = Counter(one.family for one in best if one)
         told = ", ".join(f"{name} in {count}" for name, count in wins.most_common())
         found.append(f"Of EEVEE's techniques in {len(cells)} scenes, {words}: {told}.")
     found[-2] += (
@@ -122,12 +131,9 @@ def _pairs(cells: Sequence[Row]) -> list[str]:
     for name in (DEFAULT, SHADOWS, PAPER, TEXTURE):
         told = []
         for other, words in ((LAMBERT, "Lambert"), (PRINCIPLED, "EEVEE's own scattering")):
-            pairs = [(row_of(cell, name), row_of(cell, other)) for cell in cells]
-            both = [(one, base) for one, base in pairs if one and base]
+            closer, alike, both = against(cells, name, other)
             if both:
-                closer = sum(one["rmse"]["all"] < base["rmse"]["all"] for one, base in both)
-                alike = sum(one["ssim"]["all"] > base["ssim"]["all"] for one, base in both)
-                told.append(f"{words} in {closer} of {len(both)} scenes (higher SSIM in {alike})")
+                told.append(f"{words} in {closer} of {both} scenes (higher SSIM in {alike})")
         if told:
             found.append(f"{name} is closer than {' and than '.join(told)}.")
     return found
@@ -135,12 +141,10 @@ def _pairs(cells: Sequence[Row]) -> list[str]:
 
 def _close_call(cell: Row) -> bool:
     """Whether EEVEE's second-best technique is as good as the best, for all the reference tells."""
-    known = {one.name: one for one in CONTENDERS}
     least: dict[str, float] = {}
-    for name, row in cell["contenders"].items():
-        one = known.get(base_name(name))
-        if one and one.engine == EEVEE and "rmse" in row:
-            least[one.family] = min(least.get(one.family, math.inf), row["rmse"]["all"])
+    for name, one in _eevee_rows(cell):
+        error = cell["contenders"][name]["rmse"]["all"]
+        least[one.family] = min(least.get(one.family, math.inf), error)
     ranked = sorted(least.values())
     return len(ranked) > 1 and ranked[1] - ranked[0] < float(cell["floor"]["all"])
 
@@ -165,7 +169,7 @@ def _group_sentences(results: Results) -> list[str]:
         told = []
         for name, cells in by_name.items():
             # On equal terms the plainer one is named: Lambert first, raw curvature last.
-            names = (LAMBERT, *(one for one in MAIN[1:] if of_eevee(one)), PAPER)
+            names = (LAMBERT, *(one for one in MAIN if of_eevee(one) and one != PAPER), PAPER)
             means = {one: share(cells, one, "all")[0] for one in names}
             best = min(means, key=lambda one: means[one])
             if math.isfinite(means[best]):
