@@ -10,7 +10,12 @@ from types import ModuleType
 
 
 def _modules() -> tuple[ModuleType, ...]:
-    from . import auto_update, ops, ops_measure, ops_model, panels, props
+    from .ui import light_updates as auto_update
+    from .ui import panels
+    from .ui import properties as props
+    from .ui.operators import measure as ops_measure
+    from .ui.operators import model as ops_model
+    from .ui.operators import translucency as ops
 
     return props, ops, ops_model, ops_measure, panels, auto_update
 

@@ -19,9 +19,12 @@ sys.path.insert(0, str(HERE.parent))
 
 import bpy  # noqa: E402  (the checkout must be importable first)
 
-from cdrf_addon.blender import ambient_nodes, gloss, groups, shadows  # noqa: E402
-from cdrf_addon.blender.image import ensure_table  # noqa: E402
-from cdrf_addon.core.models import name_of, profile, ring, sphere  # noqa: E402
+from cdrf_addon.blender.material import specular as gloss  # noqa: E402
+from cdrf_addon.blender.nodes import groups  # noqa: E402
+from cdrf_addon.blender.nodes.tables import ensure_table  # noqa: E402
+from cdrf_addon.blender.shader import ambient as ambient_nodes  # noqa: E402
+from cdrf_addon.blender.shader import shadows  # noqa: E402
+from cdrf_addon.core.reflectance.models import name_of, profile, ring, sphere  # noqa: E402
 
 ASSET_FILE = HERE / "cdrf.blend"
 TOPOLOGY_FILE = HERE / "topology.txt"

@@ -17,18 +17,11 @@ import numpy as np
 
 from .. import ids
 from ..compat import EEVEE
-from ..core.curvature import (
-    DEFAULT_OPTIONS,
-    CleanCurvature,
-    Options,
-    curvature_steps,
-)
-from ..core.errors import CdrfError, DependencyError, SceneError
-from ..core.facets import is_faceted
-from ..core.progress import portion
-from ..core.scale_space import LEVELS, level_steps
-from ..core.sphere import sphere_curvature
-from ..core.summary import (
+from ..core.curvature.facets import is_faceted
+from ..core.curvature.field import DEFAULT_OPTIONS, CleanCurvature, Options, curvature_steps
+from ..core.curvature.scale_space import LEVELS, level_steps
+from ..core.curvature.spherical import sphere_curvature
+from ..core.curvature.summary import (
     CONSTANT,
     FLAT,
     FLAT_SUMMARY,
@@ -36,12 +29,19 @@ from ..core.summary import (
     CurvatureSummary,
     summarise,
 )
-from . import display, gloss, linking, reflectance_models, shader, shadows, state, world
-from .image import adopt_table
+from ..core.errors import CdrfError, DependencyError, SceneError
+from ..core.progress import portion
+from . import state
+from .display import curvature as display
 from .instances import is_instance, shown_objects
-from .lights import MOST_FLAGS, SceneLight, nested_instances
-from .materials import cdrf_node, install, is_mapped, require_editable
-from .mesh_io import (
+from .lights.scene_lights import MOST_FLAGS, SceneLight, nested_instances
+from .material import linking
+from .material import model as reflectance_models
+from .material import specular as gloss
+from .material.install import cdrf_node, install, is_mapped, require_editable
+from .material.lighting import lights_on_skin, lit_elsewhere
+from .material.scattering import Scattering, read_scattering
+from .mesh.attributes import (
     Shape,
     base_fingerprint,
     coordinate_noise,
@@ -55,8 +55,10 @@ from .mesh_io import (
     to_original_vertices,
     write_curvature,
 )
-from .read_material import Scattering, read_scattering
-from .skin_lights import lights_on_skin, lit_elsewhere
+from .nodes.tables import adopt_table
+from .shader import group as shader
+from .shader import shadows
+from .world import light as world
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

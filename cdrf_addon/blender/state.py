@@ -11,12 +11,16 @@ import bpy
 import numpy as np
 
 from .. import ids
-from . import gloss, linking, shader, shadows, world
-from .image import Table, find_table
-from .lights import SceneLight
-from .materials import cdrf_node, skin_output
-from .mesh_io import base_fingerprint, has_curvature, is_measured, linear_part
-from .skin_lights import lights_on_skin, lit_elsewhere
+from .lights.scene_lights import SceneLight
+from .material import linking
+from .material import specular as gloss
+from .material.install import cdrf_node, skin_output
+from .material.lighting import lights_on_skin, lit_elsewhere
+from .mesh.attributes import base_fingerprint, has_curvature, is_measured, linear_part
+from .nodes.tables import Table, find_table
+from .shader import group as shader
+from .shader import shadows
+from .world import light as world
 
 _touched: set[int] = set()
 """session_uid of meshes edited since their hash was last compared."""

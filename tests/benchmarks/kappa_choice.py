@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which curvature, at which length: writes docs/kappa_choice.md and docs/kappa_choice.json.
+"""Which curvature, at which length: writes results/kappa_choice.md and data/kappa_choice.json.
 
     ./dev python tests/benchmarks/kappa_choice.py                         everything
     ./dev python tests/benchmarks/kappa_choice.py --only interpolation    one part, or several
@@ -42,7 +42,7 @@ from scipy.sparse.linalg import splu  # noqa: E402
 from scipy.spatial import cKDTree  # noqa: E402
 
 from cdrf_addon.compat import ensure_node_tree  # noqa: E402
-from cdrf_addon.core.reflectance import reflectance  # noqa: E402
+from cdrf_addon.core.reflectance.ring import reflectance  # noqa: E402
 
 Array = NDArray[np.float64]
 
@@ -1168,7 +1168,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=512)
     parser.add_argument("--only", nargs="*", choices=PARTS, default=list(PARTS))
     options = parser.parse_args()
-    store = ROOT / "docs" / "kappa_choice.json"
+    store = ROOT / "docs" / "results" / "data" / "kappa_choice.json"
     results = json.loads(store.read_text(encoding="utf-8")) if store.exists() else {}
     options.cache.mkdir(parents=True, exist_ok=True)
     shapes = {"head": data / "human_head.obj"}
@@ -1183,7 +1183,7 @@ def main() -> None:
         PARTS[part](study, results)
         results = rounded(results)
         store.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    page = ROOT / "docs" / "kappa_choice.md"
+    page = ROOT / "docs" / "results" / "kappa_choice.md"
     page.write_text(Report(results).page(), encoding="utf-8")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The look-up table in rendered EEVEE pixels: writes docs/lut.md and docs/lut.json.
+"""The look-up table in rendered EEVEE pixels: writes results/lut.md and data/lut.json.
 
     ./dev python tests/benchmarks/lut.py            about five minutes on two cores
 
@@ -32,16 +32,16 @@ from numpy.typing import NDArray  # noqa: E402
 from rig import Rig  # noqa: E402
 from tolerances import SHADER  # noqa: E402
 
-from cdrf_addon.blender.nodetree import TreeBuilder  # noqa: E402
+from cdrf_addon.blender.nodes.tree import TreeBuilder  # noqa: E402
 from cdrf_addon.compat import ensure_node_tree  # noqa: E402
-from cdrf_addon.core.lut import (  # noqa: E402
+from cdrf_addon.core.reflectance.lut import (  # noqa: E402
     DEFAULT_LAYOUT,
     SIGMA_MAX,
     LutLayout,
     build_lut,
     sample_lut,
 )
-from cdrf_addon.core.models import (  # noqa: E402
+from cdrf_addon.core.reflectance.models import (  # noqa: E402
     RING,
     SKIN_PROFILE,
     SPHERE,
@@ -54,7 +54,7 @@ from cdrf_addon.core.models import (  # noqa: E402
 
 Values = NDArray[np.float64]
 Wire = Callable[[TreeBuilder, Any, Any], Any]
-DOCS = ROOT / "docs"
+DOCS = ROOT / "docs" / "results"
 PIXELS = 160
 """Side of a square."""
 SQUARES = (8, 5)
@@ -564,7 +564,7 @@ def main() -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write-only", action="store_true", help="from the JSON of the last run")
-    data = DOCS / "lut.json"
+    data = DOCS / "data" / "lut.json"
     if parser.parse_args().write_only:
         results = json.loads(data.read_text())
     else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The measured model and the fits of sigma0: writes docs/measured.md and docs/measured.json.
+"""The measured model and the fits of sigma0: writes results/measured.md and data/measured.json.
 
     ./dev python tests/benchmarks/measured.py            everything, about ten minutes on two cores
     ./dev python tests/benchmarks/measured.py --only fits     one part, or several
@@ -30,11 +30,11 @@ import numpy as np  # noqa: E402  (the checkout must be importable first)
 from machine import machine  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
-from cdrf_addon.core.fitting import MODELS, ModelFitter  # noqa: E402
-from cdrf_addon.core.material_fit import fit_material  # noqa: E402
-from cdrf_addon.core.measured import MeasuredModel  # noqa: E402
-from cdrf_addon.core.measurement import SphereMeasurement, equator_weights  # noqa: E402
-from cdrf_addon.measure import QUALITIES, Request, cached, measure  # noqa: E402
+from cdrf_addon.core.measured.fitting import MODELS, ModelFitter  # noqa: E402
+from cdrf_addon.core.measured.material_fit import fit_material  # noqa: E402
+from cdrf_addon.core.measured.measurement import SphereMeasurement, equator_weights  # noqa: E402
+from cdrf_addon.core.measured.model import MeasuredModel  # noqa: E402
+from cdrf_addon.measuring.process import QUALITIES, Request, cached, measure  # noqa: E402
 
 Array = NDArray[np.float64]
 Albedo = tuple[float, float, float]
@@ -352,7 +352,7 @@ def main() -> None:
     parser.add_argument("--fine", action="store_true", help="also the time of the fine quality")
     parser.add_argument("--only", nargs="*", choices=PARTS, default=list(PARTS))
     options = parser.parse_args()
-    store = ROOT / "docs" / "measured.json"
+    store = ROOT / "docs" / "results" / "data" / "measured.json"
     results = json.loads(store.read_text(encoding="utf-8")) if store.exists() else {}
     study = Study(options.cache)
     for part in options.only:
@@ -362,7 +362,7 @@ def main() -> None:
         results["seconds"] = results.get("seconds", {}) | study.seconds
         results = rounded(results)
         store.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    (ROOT / "docs" / "measured.md").write_text(page(results), encoding="utf-8")
+    (ROOT / "docs" / "results" / "measured.md").write_text(page(results), encoding="utf-8")
     sys.stdout.flush()
     os._exit(0)  # Blender 4.5 as a module now and then hangs in its libraries' destructors
 

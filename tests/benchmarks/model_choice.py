@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which model of reflectance is closest to path tracing: writes docs/model_choice.md and .json.
+"""Which model of reflectance is closest to path tracing: writes results/model_choice.md and .json.
 
     ./dev python tests/benchmarks/model_choice.py        half an hour, most of it Cycles
 
@@ -38,13 +38,13 @@ from kappa_choice import (  # noqa: E402
 )
 from machine import machine  # noqa: E402
 
-from cdrf_addon.core.curvature import Options, curvature_steps  # noqa: E402
-from cdrf_addon.core.mesh import TriMesh  # noqa: E402
-from cdrf_addon.core.models import Model, measured_model, ring, sphere  # noqa: E402
+from cdrf_addon.core.curvature.field import Options, curvature_steps  # noqa: E402
+from cdrf_addon.core.curvature.mesh import TriMesh  # noqa: E402
+from cdrf_addon.core.curvature.scale_space import LENGTH_PER_SIGMA0, KappaLevels, level_steps  # noqa: E402
 from cdrf_addon.core.progress import run_steps  # noqa: E402
-from cdrf_addon.core.scale_space import LENGTH_PER_SIGMA0, KappaLevels, level_steps  # noqa: E402
-from cdrf_addon.core.scattering import sigma0_per_radius  # noqa: E402
-from cdrf_addon.measure import Request, measure  # noqa: E402
+from cdrf_addon.core.reflectance.models import Model, measured_model, ring, sphere  # noqa: E402
+from cdrf_addon.core.scattering.node_radius import sigma0_per_radius  # noqa: E402
+from cdrf_addon.measuring.process import Request, measure  # noqa: E402
 
 SHAPES = {
     "head": ROOT / "tests" / "data" / "human_head.obj",
@@ -234,8 +234,10 @@ def main() -> None:
     options = parser.parse_args()
     options.cache.mkdir(parents=True, exist_ok=True)
     results = study(options.cache, options.size, options.samples)
-    (ROOT / "docs" / "model_choice.json").write_text(json.dumps(results, indent=1) + "\n")
-    (ROOT / "docs" / "model_choice.md").write_text(to_markdown(results))
+    (ROOT / "docs" / "results" / "data" / "model_choice.json").write_text(
+        json.dumps(results, indent=1) + "\n"
+    )
+    (ROOT / "docs" / "results" / "model_choice.md").write_text(to_markdown(results))
 
 
 if __name__ == "__main__":

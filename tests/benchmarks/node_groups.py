@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the node group holds and costs, by lights and shadows: writes docs/node_groups.md.
+"""What the node group holds and costs, by lights and shadows: writes docs/results/node_groups.md.
 
     ./dev python tests/benchmarks/node_groups.py         half an hour on two cores; Blender 5.2
 
@@ -232,7 +232,7 @@ def measure(rounds: int) -> None:
             contender.times.append(draw())
         print(f"round {turn + 1} of {rounds}", flush=True)
         # Kept after each round, as a busy machine may not come to the last.
-        (ROOT / "docs" / "node_groups.md").write_text(page(found))
+        (ROOT / "docs" / "results" / "node_groups.md").write_text(page(found))
 
 
 def row(contender: Contender, base: Contender) -> list[str]:

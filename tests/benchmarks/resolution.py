@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same shape at several resolutions: writes docs/resolution.md, .json and the picture.
+"""The same shape at several resolutions: writes docs/results/resolution.md, .json and the picture.
 
     ./dev python tests/benchmarks/resolution.py [--levels 4]
 
@@ -25,10 +25,10 @@ from rig import Rig, cdrf_node  # noqa: E402
 
 from cdrf_addon import ids, register, unregister  # noqa: E402
 from cdrf_addon.blender import stage  # noqa: E402
-from cdrf_addon.core.scale_space import LEVELS  # noqa: E402
+from cdrf_addon.core.curvature.scale_space import LEVELS  # noqa: E402
 
 HEAD = ROOT / "tests" / "data" / "human_head.obj"
-DOCS = ROOT / "docs"
+DOCS = ROOT / "docs" / "results"
 RESOLUTION = 256
 # The head in metres: skin's red, green and blue.
 SCALE, SIGMA0, RATIO = 0.1, 0.006, (1.0, 0.35, 0.2)
@@ -154,7 +154,9 @@ def main() -> None:
         rows = compare(images)
         facts = f"Blender {bpy.app.version_string}, {platform.machine()}, software rasteriser."
         (DOCS / "resolution.md").write_text(page(rows, facts), encoding="utf-8")
-        (DOCS / "resolution.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        (DOCS / "data" / "resolution.json").write_text(
+            json.dumps(rows, indent=1) + "\n", encoding="utf-8"
+        )
         save_picture(images, DOCS / "images" / "resolution.png")
     finally:
         unregister()

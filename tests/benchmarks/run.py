@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run time of the operator: writes docs/benchmarks.md and docs/benchmarks.json.
+"""Run time of the operator: writes results/benchmarks.md and data/benchmarks.json.
 
     ./dev python tests/benchmarks/run.py            two minutes on two cores
 
@@ -115,8 +115,10 @@ def main() -> None:
         results = {"machine": machine(), "setup": bench_setup()}
     finally:
         unregister()
-    (ROOT / "docs" / "benchmarks.json").write_text(json.dumps(results, indent=1) + "\n")
-    (ROOT / "docs" / "benchmarks.md").write_text(to_markdown(results))
+    (ROOT / "docs" / "results" / "data" / "benchmarks.json").write_text(
+        json.dumps(results, indent=1) + "\n"
+    )
+    (ROOT / "docs" / "results" / "benchmarks.md").write_text(to_markdown(results))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cast shadows against Cycles, fingers held over a sphere and a head: writes docs/shadows.md.
+"""Cast shadows against Cycles, fingers held over a sphere and a head: writes results/shadows.md.
 
     ./dev python tests/benchmarks/shadows.py [--dry]       about ten minutes
 
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCS = ROOT / "docs"
+DOCS = ROOT / "docs" / "results"
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 import bpy  # noqa: E402  (the checkout must be importable first)
@@ -36,7 +36,7 @@ SAMPLES = 24
 CYCLES_SAMPLES = 128
 CASES = ("sphere 1", "head 1", "head 2")
 PORTRAIT = ("head 1", 0.1)
-"""The case whose pictures docs/artist.md shows by themselves."""
+"""The case whose pictures docs/guide/artist.md shows by themselves."""
 ALBEDO = 0.9
 RADII = (1.0, 0.35, 0.2)
 SCALES = (0.03, 0.1)
@@ -216,7 +216,10 @@ def main() -> None:
     lines += ["", f"![{LEGEND}](images/shadows.png)", "", f"{LEGEND}, in the order of the table."]
     (DOCS / "shadows.md").write_text("\n".join(lines) + "\n")
     save(np.concatenate(list(shown.values())[::-1]), DOCS / "images" / "shadows.png")
-    save(shown[PORTRAIT].repeat(2, axis=0).repeat(2, axis=1), DOCS / "images" / "shadow_head.png")
+    save(
+        shown[PORTRAIT].repeat(2, axis=0).repeat(2, axis=1),
+        ROOT / "docs" / "guide" / "images" / "shadow_head.png",
+    )
 
 
 if __name__ == "__main__":

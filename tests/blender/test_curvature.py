@@ -11,8 +11,8 @@ import pytest
 from rig import Rig, cdrf_node
 
 from cdrf_addon import ids
-from cdrf_addon.core.estimators import METHODS
-from cdrf_addon.core.summary import FLAT, VARYING
+from cdrf_addon.core.curvature.estimators import METHODS
+from cdrf_addon.core.curvature.summary import FLAT, VARYING
 
 
 def ring() -> bpy.types.Object:

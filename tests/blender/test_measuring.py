@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 from rig import Rig, cdrf_node
 
-from cdrf_addon import ids, ops_measure
-from cdrf_addon.blender import reflectance_models
-from cdrf_addon.blender.image import ensure_table, find_table
+from cdrf_addon import ids
+from cdrf_addon.blender.material import model as reflectance_models
+from cdrf_addon.blender.nodes.tables import ensure_table, find_table
 from cdrf_addon.compat import ensure_node_tree
-from cdrf_addon.core.heat_kernel import sphere_reflectance
-from cdrf_addon.core.measurement import SphereMeasurement
-from cdrf_addon.core.models import MEASURED, RING, SPHERE, measured_model
-from cdrf_addon.measure import Request
+from cdrf_addon.core.measured.measurement import SphereMeasurement
+from cdrf_addon.core.reflectance.models import MEASURED, RING, SPHERE, measured_model
+from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
+from cdrf_addon.measuring.process import Request
+from cdrf_addon.ui.operators import measure as ops_measure
 
 COSINE = np.linspace(-0.96, 0.96, 64)
 SCALES = 2.0 ** np.arange(-8.0, 3.0, 0.5)

@@ -11,12 +11,19 @@ import pytest
 from rig import Rig, cdrf_node
 
 from cdrf_addon import ids
-from cdrf_addon.blender.image import ensure_table, find_table
-from cdrf_addon.blender.read_material import read_scattering
+from cdrf_addon.blender.material.scattering import read_scattering
+from cdrf_addon.blender.nodes.tables import ensure_table, find_table
 from cdrf_addon.compat import ensure_node_tree, walk_method
-from cdrf_addon.core.models import PROFILE, RING, SKIN_PROFILE, SPHERE, parse_profile, ring
-from cdrf_addon.core.presets import PRESETS
-from cdrf_addon.core.scattering import sigma0_per_radius
+from cdrf_addon.core.reflectance.models import (
+    PROFILE,
+    RING,
+    SKIN_PROFILE,
+    SPHERE,
+    parse_profile,
+    ring,
+)
+from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
+from cdrf_addon.core.scattering.presets import PRESETS
 
 pytestmark = pytest.mark.smoke
 
@@ -142,7 +149,8 @@ def test_a_file_from_before_the_models_stays_the_papers(egg: bpy.types.Object) -
 def test_soft_lights_cost_a_profile_three_look_ups_and_resizing_is_noticed(
     egg: bpy.types.Object, rig: Rig
 ) -> None:
-    from cdrf_addon.blender import shader, state
+    from cdrf_addon.blender import state
+    from cdrf_addon.blender.shader import group as shader
 
     egg.active_material.cdrf.model = PROFILE
     assert [looks for *_, looks in shader.wired_lights(group_of(egg))] == ["RGB"]

@@ -12,7 +12,7 @@ import pytest
 from rig import Rig
 
 from cdrf_addon import ids
-from cdrf_addon.blender import groups
+from cdrf_addon.blender.nodes import groups
 
 FOLDER = Path(__file__).resolve().parents[2] / "node_groups"
 

@@ -12,8 +12,9 @@ import pytest
 from rig import Rig, cdrf_node
 
 from cdrf_addon import ids
-from cdrf_addon.blender import shader, state
+from cdrf_addon.blender import state
 from cdrf_addon.blender.setup import Setup, run
+from cdrf_addon.blender.shader import group as shader
 
 
 def attribute(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -55,7 +56,7 @@ def test_torus_gets_its_curvature_in_all_four_channels(rig: Rig) -> None:
     ring = np.hypot(points[:, 0], points[:, 1])
     expected_k1 = np.full(len(points), 1.0 / 0.25)
     expected_k2 = (ring - 1.0) / 0.25 / ring
-    # 96 x 48 quads, split: the fit over two rings is 3 % off at this density (docs/accuracy.md).
+    # 96 x 48 quads, split: the fit over two rings is 3 % off at this density (results/accuracy.md).
     assert np.abs(k1 - expected_k1).max() <= 0.03 * 4.0
     assert np.abs(k2 - expected_k2).max() <= 0.03 * 4.0
     assert np.allclose(mean, (k1 + k2) / 2.0, rtol=1e-5)
@@ -408,7 +409,7 @@ def test_undo_takes_back_each_operator(rig: Rig) -> None:
 
 
 def cdrf_of(item: bpy.types.Object) -> object:
-    from cdrf_addon.blender.materials import cdrf_node as find
+    from cdrf_addon.blender.material.install import cdrf_node as find
 
     return find(item.active_material)
 
@@ -511,8 +512,8 @@ def test_curvature_display_follows_an_update_and_goes_away(rig: Rig) -> None:
 
 
 def test_deleted_parts_come_back_at_the_next_update(rig: Rig) -> None:
-    from cdrf_addon.blender.materials import skin_output
-    from cdrf_addon.blender.nodetree import is_intact
+    from cdrf_addon.blender.material.install import skin_output
+    from cdrf_addon.blender.nodes.tree import is_intact
     from cdrf_addon.blender.state import reasons_to_update
 
     rig.light("SUN")

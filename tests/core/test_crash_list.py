@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from cdrf_addon.core.curvature import principal_curvatures
+from cdrf_addon.core.curvature.field import principal_curvatures
+from cdrf_addon.core.curvature.mesh import TriMesh
+from cdrf_addon.core.curvature.summary import summarise
 from cdrf_addon.core.errors import CdrfError
-from cdrf_addon.core.mesh import TriMesh
-from cdrf_addon.core.summary import summarise
 
 pytestmark = pytest.mark.smoke
 

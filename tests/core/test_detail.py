@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from cdrf_addon.core.detail import DETAIL_PER_SIGMA0, detail_left
+from cdrf_addon.core.reflectance.detail import DETAIL_PER_SIGMA0, detail_left
 
 
 @pytest.mark.parametrize("ratio", [0.3, 1.0])

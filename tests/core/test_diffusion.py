@@ -13,9 +13,9 @@ import pytest
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import spsolve
 
-from cdrf_addon.core import diffusion
-from cdrf_addon.core.diffusion import Diffusion
-from cdrf_addon.core.mesh import CleanMesh, TriMesh, clean
+from cdrf_addon.core.curvature import diffusion
+from cdrf_addon.core.curvature.diffusion import Diffusion
+from cdrf_addon.core.curvature.mesh import CleanMesh, TriMesh, clean
 from cdrf_addon.core.progress import run_steps
 from tests.core.test_mesh import icosphere, plane
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdrf_addon.core.facets import is_faceted
-from cdrf_addon.core.mesh import TriMesh
+from cdrf_addon.core.curvature.facets import is_faceted
+from cdrf_addon.core.curvature.mesh import TriMesh
 from tests.core.test_mesh import icosphere, moebius, plane
 
 CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T * 2.0 - 1.0

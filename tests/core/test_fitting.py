@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from cdrf_addon.core.errors import MeasurementError
-from cdrf_addon.core.fitting import MODELS, ModelFitter
-from cdrf_addon.core.material_fit import (
+from cdrf_addon.core.measured.fitting import MODELS, ModelFitter
+from cdrf_addon.core.measured.material_fit import (
     WEIGHTINGS,
     fit_material,
     proportional,
     sigma0_at,
     sigma_per_scale,
 )
-from cdrf_addon.core.measurement import SphereMeasurement, equator_weights
-from cdrf_addon.core.reflectance import reflectance
+from cdrf_addon.core.measured.measurement import SphereMeasurement, equator_weights
+from cdrf_addon.core.reflectance.ring import reflectance
 
 SEED = 20111106
 COSINE = np.linspace(-0.96, 0.96, 72)

@@ -18,13 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cdrf_addon.core.curvature import CleanCurvature, Options, curvature_steps
+from cdrf_addon.core.curvature.estimators import METHODS
+from cdrf_addon.core.curvature.field import CleanCurvature, Options, curvature_steps
+from cdrf_addon.core.curvature.mesh import NO_CREASE, CleanMesh, TriMesh, shared_edges
+from cdrf_addon.core.curvature.scale_space import LEVELS, level_steps
+from cdrf_addon.core.curvature.summary import summarise
 from cdrf_addon.core.errors import CdrfError
-from cdrf_addon.core.estimators import METHODS
-from cdrf_addon.core.mesh import NO_CREASE, CleanMesh, TriMesh, shared_edges
 from cdrf_addon.core.progress import run_steps
-from cdrf_addon.core.scale_space import LEVELS, level_steps
-from cdrf_addon.core.summary import summarise
 
 ROOT = Path(__file__).resolve().parents[2]
 SEED = int(os.environ.get("CDRF_FUZZ_SEED", "20260722"))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cdrf_addon.core.errors import ParameterError
-from cdrf_addon.core.lut import (
+from cdrf_addon.core.reflectance.lut import (
     DEFAULT_LAYOUT,
     SIGMA_MAX,
     LutLayout,
@@ -16,7 +16,7 @@ from cdrf_addon.core.lut import (
     sample_lut,
     sigma_axis,
 )
-from cdrf_addon.core.models import PROFILE, RING, SPHERE, Model, profile, ring, sphere
+from cdrf_addon.core.reflectance.models import PROFILE, RING, SPHERE, Model, profile, ring, sphere
 
 pytestmark = pytest.mark.smoke
 
@@ -164,7 +164,7 @@ def test_beyond_the_table_the_model_has_reached_its_limit(model: Model, table: n
 
 def test_a_profile_ends_where_its_widest_channel_does() -> None:
     # Red has an RMS width of SIGMA_MAX there; what the narrow Gaussians would still do is left out
-    # (docs/decisions/002-lut-mapping.md), so that the table need not reach fifteen times as far.
+    # (decision 002), so that the table need not reach fifteen times as far.
     skin = build_lut(profile())
     cosine = np.linspace(-1.0, 1.0, 1_001)
     exact = profile().evaluate(np.arccos(cosine), SIGMA_MAX)

@@ -12,9 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cdrf_addon.core.errors import MeasurementError, ParameterError
-from cdrf_addon.core.heat_kernel import sphere_reflectance
-from cdrf_addon.core.measured import MeasuredModel
-from cdrf_addon.core.measurement import (
+from cdrf_addon.core.measured.measurement import (
     SphereMeasurement,
     bin_pixels,
     equator_weights,
@@ -23,7 +21,9 @@ from cdrf_addon.core.measurement import (
     save,
     solid_angle_weights,
 )
-from cdrf_addon.core.smoothing import smooth_rows
+from cdrf_addon.core.measured.model import MeasuredModel
+from cdrf_addon.core.measured.smoothing import smooth_rows
+from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 Array = NDArray[np.float64]
 SEED = 20111106

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from cdrf_addon.core.curvature.mesh import EDGE_LIMIT, CleanMesh, TriMesh, clean, weld
+from cdrf_addon.core.curvature.topology import edge_lengths
 from cdrf_addon.core.errors import MeshError
-from cdrf_addon.core.mesh import EDGE_LIMIT, CleanMesh, TriMesh, clean, weld
-from cdrf_addon.core.topology import edge_lengths
 
 TOLERANCE = {
     # Normalised coordinates are of size 1 to 100 and see four roundings of 1.1e-16.

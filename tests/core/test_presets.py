@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from cdrf_addon.core.dipole import Medium
 from cdrf_addon.core.errors import ParameterError
-from cdrf_addon.core.models import PROFILE, SKIN_PROFILE, SPHERE
-from cdrf_addon.core.presets import ARTIST, PRESETS, in_units
+from cdrf_addon.core.reflectance.models import PROFILE, SKIN_PROFILE, SPHERE
+from cdrf_addon.core.scattering.dipole import Medium
+from cdrf_addon.core.scattering.presets import ARTIST, PRESETS, in_units
 
 pytestmark = pytest.mark.smoke
 

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from cdrf_addon.core.curvature import CurvatureField, principal_curvatures
-from cdrf_addon.core.mesh import TriMesh
-from cdrf_addon.core.summary import CONSTANT, FLAT, VARYING, CurvatureSummary, summarise
+from cdrf_addon.core.curvature.field import CurvatureField, principal_curvatures
+from cdrf_addon.core.curvature.mesh import TriMesh
+from cdrf_addon.core.curvature.summary import CONSTANT, FLAT, VARYING, CurvatureSummary, summarise
 from tests.core.test_mesh import grid_triangles, icosphere, plane
 
 pytestmark = pytest.mark.smoke

@@ -12,10 +12,12 @@ from rig import Rig, cdrf_node, diffuse_material
 from tolerances import WORLD_CYCLES, WRITTEN
 
 from cdrf_addon import compat, ids
-from cdrf_addon.blender import state, world, world_capture
-from cdrf_addon.core.ambient import band_factors, lit_by, panorama_directions
+from cdrf_addon.blender import state
+from cdrf_addon.blender.world import capture as world_capture
+from cdrf_addon.blender.world import light as world
 from cdrf_addon.core.errors import SceneError
-from cdrf_addon.core.models import PROFILE, RING, profile, ring, sphere
+from cdrf_addon.core.reflectance.environment import band_factors, lit_by, panorama_directions
+from cdrf_addon.core.reflectance.models import PROFILE, RING, profile, ring, sphere
 
 
 @pytest.fixture

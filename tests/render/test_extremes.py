@@ -13,7 +13,7 @@ from rig import Rig, cdrf_node
 from tolerances import WRITTEN
 
 from cdrf_addon import ids
-from cdrf_addon.core.heat_kernel import sphere_reflectance
+from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 ODD_LIGHTS: dict[str, dict[str, Any]] = {
     "at the centre": {"kind": "POINT", "energy": 10.0},

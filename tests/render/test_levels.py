@@ -12,8 +12,13 @@ from rig import Rig, cdrf_node
 from tolerances import SHADER
 
 from cdrf_addon import ids
-from cdrf_addon.core.heat_kernel import sphere_reflectance
-from cdrf_addon.core.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS, KappaLevels
+from cdrf_addon.core.curvature.scale_space import (
+    LENGTH_PER_SIGMA0,
+    LEVEL_RATIO,
+    LEVELS,
+    KappaLevels,
+)
+from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 FROM_THE_SIDE = (math.radians(50.0), 0.0, math.radians(70.0))
 KAPPAS = (3.0, 1.5, 0.6, 0.2)

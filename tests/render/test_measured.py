@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdrf_addon import measure as measuring
 from cdrf_addon.core.errors import MeasurementError
-from cdrf_addon.core.fitting import ModelFitter
-from cdrf_addon.core.measured import MeasuredModel
-from cdrf_addon.core.measurement import equator_weights
-from cdrf_addon.measure import QUALITIES, Quality, Request, measure, measure_steps
+from cdrf_addon.core.measured.fitting import ModelFitter
+from cdrf_addon.core.measured.measurement import equator_weights
+from cdrf_addon.core.measured.model import MeasuredModel
+from cdrf_addon.measuring import process as measuring
+from cdrf_addon.measuring.process import QUALITIES, Quality, Request, measure, measure_steps
 
 # Half octaves, as a table has them, but only those that the fresh spheres need.
 ROWS = tuple(2.0 ** (0.5 * step) for step in range(-12, 0))

@@ -12,10 +12,11 @@ from rig import Rig, cdrf_node
 from tolerances import SHADER, WRITTEN
 
 from cdrf_addon import compat, ids
-from cdrf_addon.blender import gloss, state
-from cdrf_addon.core.detail import detail_left
-from cdrf_addon.core.heat_kernel import sphere_reflectance
-from cdrf_addon.core.models import PROFILE, profile
+from cdrf_addon.blender import state
+from cdrf_addon.blender.material import specular as gloss
+from cdrf_addon.core.reflectance.detail import detail_left
+from cdrf_addon.core.reflectance.models import PROFILE, profile
+from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 FROM_THE_SIDE = (math.radians(50.0), 0.0, math.radians(70.0))
 TILT = np.array([0.5, -0.2, 0.3])

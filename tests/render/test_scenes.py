@@ -14,10 +14,11 @@ from rig import RESOLUTION, Rig, cdrf_node
 from tolerances import WRITTEN
 
 from cdrf_addon import ids
-from cdrf_addon.blender import setup, shader, state
-from cdrf_addon.blender.shadows import choose
-from cdrf_addon.blender.skin_lights import lit_elsewhere
-from cdrf_addon.core.heat_kernel import sphere_reflectance
+from cdrf_addon.blender import setup, state
+from cdrf_addon.blender.material.lighting import lit_elsewhere
+from cdrf_addon.blender.shader import group as shader
+from cdrf_addon.blender.shader.shadows import choose
+from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 Array = NDArray[np.float64]
 SCALE = 3.0

@@ -18,7 +18,7 @@ from tolerances import SHADOW, SHADOW_OF_HAT, SHADOW_OF_MANY, SHADOW_WORLD
 from cdrf_addon import ids
 from cdrf_addon.blender import state
 from cdrf_addon.compat import HAS_RAYCAST
-from cdrf_addon.core.heat_kernel import sphere_reflectance
+from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 SIGMA = 0.2
 SCALE = 2.3

@@ -13,9 +13,9 @@ from rig import Rig, cdrf_node
 from scipy.integrate import quad
 from tolerances import FOUR_LIGHTS, SHADER, WRITTEN, Bound
 
-from cdrf_addon.core.finite_light import SPHERE_GAIN, finite_light
-from cdrf_addon.core.heat_kernel import sphere_reflectance
-from cdrf_addon.core.models import PROFILE, RING, SPHERE, profile, ring, sphere
+from cdrf_addon.core.reflectance.finite_light import SPHERE_GAIN, finite_light
+from cdrf_addon.core.reflectance.models import PROFILE, RING, SPHERE, profile, ring, sphere
+from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 SIGMAS = (0.0, 0.01, 0.05, 0.1, 0.3, 1.0, 3.0, 30.0)
 FROM_THE_SIDE = (math.radians(50.0), 0.0, math.radians(70.0))

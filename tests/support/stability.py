@@ -2,7 +2,7 @@
 """Which tests try what is stiff or extreme, and the guard in the code that holds it.
 
 `pytest -m stability --stability FILE` runs them and writes what came out; the report makes
-docs/stability.md of that file, so that the page tells of a run and not of an intention.
+docs/results/stability.md of that file, so that the page tells of a run and not of an intention.
 """
 
 from __future__ import annotations
@@ -34,36 +34,36 @@ CLEAN = "core/mesh.py welds, filters, orients and normalises before any estimate
 NODES = "nodes clamp what they divide by and what they look up"
 
 EXTREMES = (
-    Extreme(SIGMA, "core/test_reflectance.py::test_the_value_at_1001_angles",
+    Extreme(SIGMA, "core/test_ring_model.py::test_the_value_at_1001_angles",
             "ring: σ from 0 over 10⁻¹² and 10¹² to ∞, 1,001 angles",
             "within the bound of the reference", CLOSED),
-    Extreme(SIGMA, "core/test_heat_kernel.py::test_the_value_at_1001_angles",
+    Extreme(SIGMA, "core/test_sphere_model.py::test_the_value_at_1001_angles",
             "sphere: the same, with more angles at the terminator",
             "within the bound of the reference", CLOSED),
-    Extreme(SIGMA, "core/test_reflectance.py::test_nothing_warns",
+    Extreme(SIGMA, "core/test_ring_model.py::test_nothing_warns",
             "ring: σ of 5 × 10⁻³²⁴, 10⁻³⁰⁰, 10²⁰⁰, ∞", "finite, no warning", CLOSED),
-    Extreme(SIGMA, "core/test_heat_kernel.py::test_nothing_warns",
+    Extreme(SIGMA, "core/test_sphere_model.py::test_nothing_warns",
             "sphere: the same", "finite, no warning", CLOSED),
-    Extreme(SIGMA, "core/test_reflectance.py::test_no_blur_is_lambert_to_the_last_bit",
+    Extreme(SIGMA, "core/test_ring_model.py::test_no_blur_is_lambert_to_the_last_bit",
             "ring: σ = 0", "Lambert to the last bit", "σ = 0 has a branch of its own"),
-    Extreme(SIGMA, "core/test_heat_kernel.py::test_no_blur_is_lambert_to_the_last_bit",
+    Extreme(SIGMA, "core/test_sphere_model.py::test_no_blur_is_lambert_to_the_last_bit",
             "sphere: σ = 0", "Lambert to the last bit", "σ = 0 has a branch of its own"),
-    Extreme(SIGMA, "core/test_reflectance.py::test_endless_blur_is_one_over_pi",
+    Extreme(SIGMA, "core/test_ring_model.py::test_endless_blur_is_one_over_pi",
             "ring: σ from 10¹² to the largest double and ∞", "1/π", "the series ends at its mean"),
-    Extreme(SIGMA, "core/test_heat_kernel.py::test_endless_blur_is_a_quarter_to_the_last_bit",
+    Extreme(SIGMA, "core/test_sphere_model.py::test_endless_blur_is_a_quarter_to_the_last_bit",
             "sphere: σ from 10³ to the largest double and ∞", "1/4 to the last bit",
             "the series ends at its mean"),
-    Extreme(SIGMA, "core/test_heat_kernel.py::test_the_mean_over_the_sphere_is_a_quarter",
+    Extreme(SIGMA, "core/test_sphere_model.py::test_the_mean_over_the_sphere_is_a_quarter",
             "energy over the whole sphere, σ from 0 to ∞", "1/4 for every σ",
             "the heat kernel keeps it"),
-    Extreme(SIGMA, "core/test_reflectance.py::test_no_step_where_the_two_forms_meet",
+    Extreme(SIGMA, "core/test_ring_model.py::test_no_step_where_the_two_forms_meet",
             "ring: σ a last bit to each side of the change of form", "no step",
             "both forms are exact where they meet"),
-    Extreme(SIGMA, "core/test_heat_kernel.py::test_no_step_where_the_two_forms_meet",
+    Extreme(SIGMA, "core/test_sphere_model.py::test_no_step_where_the_two_forms_meet",
             "sphere: the same", "no step", "both forms are exact where they meet"),
-    Extreme(SIGMA, "core/test_reflectance.py::test_nonsense_is_refused_in_a_sentence",
+    Extreme(SIGMA, "core/test_ring_model.py::test_nonsense_is_refused_in_a_sentence",
             "ring: NaN, ±∞ and negative arguments", "a sentence", "core/arguments.py"),
-    Extreme(SIGMA, "core/test_heat_kernel.py::test_nonsense_is_refused_in_a_sentence",
+    Extreme(SIGMA, "core/test_sphere_model.py::test_nonsense_is_refused_in_a_sentence",
             "sphere: the same", "a sentence", "core/arguments.py"),
     Extreme(SIGMA, "core/test_models.py::test_one_gaussian_of_any_width_is_the_base",
             "profiles of one Gaussian, width 10⁻³⁰⁰ to 10³⁰", "the base model",
@@ -127,10 +127,10 @@ EXTREMES = (
             "the radiometry of decision 3"),
     Extreme(LIGHTS, "core/test_finite_light.py::test_the_blur_stands_for_the_light",
             "lights up to half-angles of 46°", "within the stated error", "core/finite_light.py"),
-    Extreme(LIGHTS, "core/test_ambient.py::test_senseless_pixels_are_black_and_shapes_are_checked",
+    Extreme(LIGHTS, "core/test_environment.py::test_senseless_pixels_are_black_and_shapes_are_checked",
             "worlds with pixels of NaN, ∞ and negative radiance", "black there",
             "core/ambient.py clips"),
-    Extreme(LIGHTS, "core/test_ambient.py::test_extremes_of_sigma",
+    Extreme(LIGHTS, "core/test_environment.py::test_extremes_of_sigma",
             "a world's light at σ of 0 and ∞", "Lambert's, and its mean", "closed band factors"),
     Extreme(LIGHTS, "render/test_ambient.py::test_no_node_for_a_black_or_missing_world",
             "no world, and a black one", "no node, no error", "a world is wired only if it shines"),

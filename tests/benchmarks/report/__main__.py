@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes docs/report.md and docs/stability.md, their pictures and raw results in docs/report/.
+"""Writes results/report.md and results/stability.md, pictures and raw results in results/report/.
 
     ./dev python tests/benchmarks/report                  everything, from nothing: many hours
     ./dev python tests/benchmarks/report --missing        what is not there yet
@@ -58,7 +58,9 @@ def main() -> None:
     from report import figures, matrix, page, paper, settings, stability, timing
 
     make = settings.quick if chosen.sample else settings.full
-    docs = chosen.docs or (ROOT / "output" / "sample" if chosen.sample else ROOT / "docs")
+    docs = chosen.docs or (
+        ROOT / "output" / "sample" if chosen.sample else ROOT / "docs" / "results"
+    )
     here = make(docs.resolve(), cache)
     stages = ["timing"] if chosen.timing else chosen.only or list(STAGES)
     deadline = time.monotonic() + 60.0 * chosen.minutes

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdrf_addon import ids
-from cdrf_addon.core.ambient import lit_by, project, reduce_picture
-from cdrf_addon.core.summary import CONSTANT
+from cdrf_addon.core.curvature.summary import CONSTANT
+from cdrf_addon.core.reflectance.environment import lit_by, project, reduce_picture
 
 from . import texture_blurring
 from .scenes import Stage, directions

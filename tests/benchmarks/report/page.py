@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/report.md, from the raw results alone: every number in it is looked up, none is typed."""
+"""results/report.md, from the raw results alone: every number in it is looked up, none is typed."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def conclusions(results: Results) -> list[str]:
 
 
 def write(settings: Settings) -> None:
-    """Write docs/report.md, and docs/report_scenes.md if there is more than fits on it."""
+    """Write results/report.md, and results/report_scenes.md if there is more than fits on it."""
     results = Results(settings)
     _write(
         settings.docs / "report.md",

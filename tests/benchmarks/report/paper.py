@@ -15,14 +15,14 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from cdrf_addon import ids
-from cdrf_addon.blender.fit_figure import draw_fit
 from cdrf_addon.compat import ensure_node_tree
-from cdrf_addon.core.lut import build_lut, sample_lut
-from cdrf_addon.core.material_fit import fit_material
-from cdrf_addon.core.measured import MeasuredModel
-from cdrf_addon.core.models import sphere
-from cdrf_addon.measure import Request
-from cdrf_addon.measure import measure as measure_spheres
+from cdrf_addon.core.measured.material_fit import fit_material
+from cdrf_addon.core.measured.model import MeasuredModel
+from cdrf_addon.core.reflectance.lut import build_lut, sample_lut
+from cdrf_addon.core.reflectance.models import sphere
+from cdrf_addon.measuring.figure import draw_fit
+from cdrf_addon.measuring.process import Request
+from cdrf_addon.measuring.process import measure as measure_spheres
 from node_groups import kinds
 
 from . import texture_blurring

@@ -11,7 +11,7 @@ from typing import Any
 from .settings import Settings
 
 ROOT = Path(__file__).resolve().parents[3]
-SAMPLE = ("tests/core/test_reflectance.py",)
+SAMPLE = ("tests/core/test_ring_model.py",)
 """What of it is run for the sample, which itself runs in a test."""
 
 
@@ -99,7 +99,7 @@ def _row(test: dict[str, Any]) -> list[str]:
 
 
 def write(settings: Settings) -> bool:
-    """Write docs/stability.md if there are results; whether there were."""
+    """Write docs/results/stability.md if there are results; whether there were."""
     results = settings.read("stability")
     if not results:
         return False

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from cdrf_addon.core.models import Profile
-from cdrf_addon.core.presets import PRESETS, Colour, Preset
-from cdrf_addon.core.scattering import sigma0_per_radius
+from cdrf_addon.core.reflectance.models import Profile
+from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
+from cdrf_addon.core.scattering.presets import PRESETS, Colour, Preset
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a material already says of its subsurface scattering: a Principled or Subsurface node.
+
+Blender has no shader that scatters differently over a surface in our sense, so an albedo that comes
+from a picture is read as the picture's mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ... import ids
+from ...compat import uses_nodes
+
+Colour = tuple[float, float, float]
+# Pixels of a picture that are looked at for its mean.
+MOST_PIXELS = 250_000
+# How Blender makes one number of a colour (Rec. 709).
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+
+
+@dataclass(frozen=True)
+class Scattering:
+    """Subsurface scattering as Blender's nodes describe it."""
+
+    albedo: Colour
+    radius: Colour
+    """Radius times scale of each channel, in the scene's units."""
+    method: str
+    """Blender's name: RANDOM_WALK, RANDOM_WALK_SKIN or BURLEY."""
+    weight: float
+    """Part of the surface that scatters; 1 for a Subsurface Scattering node."""
+    notes: tuple[str, ...] = ()
+    """What could not be read as it is, a sentence each."""
+
+
+def read_scattering(material: bpy.types.Material) -> Scattering | None:
+    """Read the scattering of the material's own surface; None if nothing in it scatters.
+
+    The first node counts that feeds the material's output, through mixes and node groups; our own
+    nodes are left aside.
+    """
+    if not uses_nodes(material):
+        return None
+    outputs = [
+        node
+        for node in material.node_tree.nodes
+        if node.type == "OUTPUT_MATERIAL" and node.get(ids.ROLE_KEY) != ids.ROLE_OUTPUT
+    ]
+    outputs.sort(key=lambda node: (node.is_active_output, node.target == "ALL"), reverse=True)
+    pending = [output.inputs["Surface"] for output in outputs]
+    seen = set()
+    while pending:
+        source = _source(pending.pop(0))
+        if source is None or source.node.mute or source in seen:
+            continue
+        seen.add(source)
+        found = _of_node(source.node)
+        if found is not None:
+            return found
+        pending += _shaders_of(source)
+    return None
+
+
+def _shaders_of(source: bpy.types.NodeSocket) -> list[bpy.types.NodeSocket]:
+    """Inputs through which shaders reach an output: of a mix those that show, of a group inside."""
+    node = source.node
+    if node.type == "GROUP" and node.node_tree is not None:
+        return [
+            socket
+            for inner in node.node_tree.nodes
+            if inner.type == "GROUP_OUTPUT" and inner.is_active_output
+            for socket in inner.inputs
+            if socket.identifier == source.identifier
+        ]
+    shaders = [socket for socket in node.inputs if socket.type == "SHADER"]
+    if node.type == "MIX_SHADER" and not node.inputs[0].is_linked:
+        share = node.inputs[0].default_value
+        if share <= 0.0 or share >= 1.0:
+            return shaders[:1] if share <= 0.0 else shaders[1:]
+    return shaders
+
+
+def _of_node(node: bpy.types.ShaderNode) -> Scattering | None:
+    notes: list[str] = []
+    if node.type == "BSDF_PRINCIPLED":
+        weight = _number(node, "Subsurface Weight", notes)
+        if _source(node.inputs["Subsurface Weight"]) is not None and notes:
+            weight = 1.0
+            notes = [f"Subsurface Weight of '{node.name}' varies; it was taken as 1."]
+        unseen = max(_number(node, name, []) for name in ("Metallic", "Transmission Weight"))
+        weight *= max(1.0 - unseen, 0.0)
+        if not weight > 0.0:
+            return None
+        method = node.subsurface_method
+        names = ("Base Color", "Subsurface Scale", "Subsurface Radius", "Subsurface Anisotropy")
+    elif node.type == "SUBSURFACE_SCATTERING":
+        weight = 1.0
+        method = node.falloff
+        names = ("Color", "Scale", "Radius", "Anisotropy")
+    else:
+        return None
+    albedo = _colour(node, names[0], notes)
+    scale = _number(node, names[1], notes)
+    lengths = [max(part * scale, 0.0) for part in _vector(node, names[2], notes)]
+    if not (max(lengths) > 0.0 and np.isfinite(lengths).all()):
+        return None
+    if method != "BURLEY" and _number(node, names[3], []) != 0.0:
+        notes.append(f"The anisotropy of '{node.name}' is left out.")
+    if weight < 1.0:
+        notes.append(
+            f"Only {weight:.0%} of '{node.name}' scatters; CDRF takes the whole surface as if it "
+            "did, so lower the scatter distance if that is too much."
+        )
+    return Scattering(albedo, (lengths[0], lengths[1], lengths[2]), method, weight, tuple(notes))
+
+
+def _number(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> float:
+    parts = _value(node, name, notes)
+    return parts[0] if len(parts) == 1 else float(np.dot(parts[:3], LUMINANCE))
+
+
+def _vector(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> Colour:
+    parts = _value(node, name, notes)
+    return (parts[0],) * 3 if len(parts) < 3 else (parts[0], parts[1], parts[2])
+
+
+def _value(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> list[float]:
+    """Read an input, through plain value nodes and reroutes; a texture leaves the socket's own."""
+    socket = node.inputs[name]
+    source = _source(socket)
+    if source is not None:
+        if source.node.type in {"VALUE", "RGB"}:
+            return _plain(source)
+        notes.append(f"{name} comes from '{source.node.name}'; its plain value was taken instead.")
+    return _plain(socket)
+
+
+def _colour(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> Colour:
+    source = _source(node.inputs[name])
+    if source is not None and source.node.type == "TEX_IMAGE" and source.name == "Color":
+        mean = _mean(source.node.image)
+        if mean is not None:
+            notes.append(f"{name} comes from a picture; its mean colour was taken.")
+            return mean
+    return _vector(node, name, notes)
+
+
+def _source(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
+    """Return the output that feeds a socket, or None."""
+    for _ in range(64):
+        if not socket.is_linked:
+            return None
+        found = socket.links[0].from_socket
+        if found.node.type != "REROUTE":
+            return found
+        socket = found.node.inputs[0]
+    return None
+
+
+def _plain(socket: bpy.types.NodeSocket) -> list[float]:
+    """Value of a socket: one number, or the three of a vector or colour."""
+    value: Any = socket.default_value
+    return [float(value)] if isinstance(value, float | int) else [float(v) for v in value][:3]
+
+
+def _mean(image: bpy.types.Image | None) -> Colour | None:
+    """Mean colour of a picture, linear; None if it cannot be read."""
+    if image is None or (not image.has_data and image.source not in {"FILE", "GENERATED"}):
+        return None
+    width, height = image.size
+    if not width * height or not image.channels >= 3:
+        return None
+    flat = np.empty(width * height * image.channels, dtype=np.float32)
+    image.pixels.foreach_get(flat)
+    pixels = flat.reshape(-1, image.channels)
+    pixels = pixels[:: max(1, len(pixels) // MOST_PIXELS)]
+    solid = pixels[:, 3] > 0.0 if image.channels > 3 else np.ones(len(pixels), dtype=bool)
+    with np.errstate(over="ignore"):
+        values = np.clip(np.nan_to_num(pixels[solid, :3].astype(np.float64)), 0.0, 1.0)
+    if not len(values):
+        return None
+    # Pixels come as they are stored: 8-bit pictures are display-referred.
+    if image.colorspace_settings.name == "sRGB":
+        values = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    red, green, blue = values.mean(axis=0)
+    return float(red), float(green), float(blue)

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small builder for shader node trees: operands in, output socket back, links by socket name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+from ... import ids
+
+Operand = "bpy.types.NodeSocket | float | tuple[float, ...]"
+COLUMN_WIDTH = 190.0
+ROW_HEIGHT = 170.0
+
+
+class TreeBuilder:
+    """Adds nodes to a tree. Every method returns the output socket that carries its result.
+
+    Operands are sockets (linked) or numbers (set as the input's default), so an expression reads
+    like one: ``b.math("SQRT", b.math("MULTIPLY", x, 2.0))``.
+    """
+
+    def __init__(self, tree: bpy.types.ShaderNodeTree) -> None:
+        self.tree = tree
+
+    def node(self, kind: str, label: str = "", **settings: Any) -> bpy.types.ShaderNode:
+        """Add a node of the type `kind`; `settings` are its properties."""
+        node = self.tree.nodes.new(kind)
+        if label:
+            node.name = node.label = label
+        for name, value in settings.items():
+            setattr(node, name, value)
+        return node
+
+    def group(
+        self, tree: bpy.types.ShaderNodeTree, label: str, **operands: Any
+    ) -> bpy.types.ShaderNode:
+        """Add an instance of a node group; `operands` are keyed by socket name, blanks as ``_``."""
+        node = self.node("ShaderNodeGroup", label, node_tree=tree)
+        for name, operand in operands.items():
+            self.feed(node.inputs[name.replace("_", " ")], operand)
+        return node
+
+    def feed(self, socket: bpy.types.NodeSocket, operand: Any) -> None:
+        """Link a socket or set a number; refuse an input that Blender would ignore."""
+        if not socket.enabled:
+            raise ValueError(f"{socket.node.name}: input {socket.name} is not used in this mode")
+        if isinstance(operand, bpy.types.NodeSocket):
+            self.tree.links.new(operand, socket)
+        else:
+            socket.default_value = operand
+
+    def math(self, operation: str, *operands: Any, clamp: bool = False) -> bpy.types.NodeSocket:
+        """Scalar arithmetic; the Math node's inputs all bear one name, so they go by position."""
+        node = self.node("ShaderNodeMath", operation=operation, use_clamp=clamp)
+        for socket, operand in zip(node.inputs, operands, strict=False):
+            self.feed(socket, operand)
+        return node.outputs["Value"]
+
+    def vector(self, operation: str, *operands: Any, scale: Any = None) -> bpy.types.NodeSocket:
+        """Vector arithmetic; returns the scalar output for DOT_PRODUCT and LENGTH."""
+        node = self.node("ShaderNodeVectorMath", operation=operation)
+        for socket, operand in zip(node.inputs, operands, strict=False):
+            self.feed(socket, operand)
+        if scale is not None:
+            self.feed(node.inputs["Scale"], scale)
+        scalar = operation in {"DOT_PRODUCT", "LENGTH", "DISTANCE"}
+        return node.outputs["Value" if scalar else "Vector"]
+
+    def combine(self, x: Any, y: Any, z: Any) -> bpy.types.NodeSocket:
+        """Three scalars to a vector."""
+        node = self.node("ShaderNodeCombineXYZ")
+        for name, operand in zip("XYZ", (x, y, z), strict=True):
+            self.feed(node.inputs[name], operand)
+        return node.outputs["Vector"]
+
+    def separate(self, vector: Any) -> tuple[bpy.types.NodeSocket, ...]:
+        """A vector to its three scalars."""
+        node = self.node("ShaderNodeSeparateXYZ")
+        self.feed(node.inputs["Vector"], vector)
+        return tuple(node.outputs[name] for name in "XYZ")
+
+    def ends(self) -> tuple[Any, Any]:
+        """Add the group's input and output; return the sockets that they offer."""
+        return self.node("NodeGroupInput").outputs, self.node("NodeGroupOutput").inputs
+
+    def look_up(self, image: bpy.types.Image, label: str, *place: Any) -> Any:
+        """Read an image by tube projection at x, y, z; return the outputs Red, Green and Blue."""
+        texture = self.node(
+            "ShaderNodeTexImage",
+            label,
+            image=image,
+            projection="TUBE",
+            interpolation="Linear",
+            extension="EXTEND",
+        )
+        self.feed(texture.inputs["Vector"], self.combine(*place))
+        parts = self.node("ShaderNodeSeparateColor")
+        self.feed(parts.inputs["Color"], texture.outputs["Color"])
+        return parts.outputs
+
+    def arrange(self) -> None:
+        """Place each node one column right of the furthest node it depends on."""
+        depth: dict[str, int] = {}
+        sources: dict[str, list[str]] = {node.name: [] for node in self.tree.nodes}
+        for link in self.tree.links:
+            sources[link.to_node.name].append(link.from_node.name)
+
+        def column(name: str) -> int:
+            if name not in depth:
+                depth[name] = 0  # a cycle cannot occur in a shader tree; this only guards recursion
+                depth[name] = max((column(source) + 1 for source in sources[name]), default=0)
+            return depth[name]
+
+        filled: dict[int, int] = {}
+        for node in self.tree.nodes:
+            at = column(node.name)
+            row = filled.get(at, 0)
+            filled[at] = row + 1
+            node.location = (at * COLUMN_WIDTH, -row * ROW_HEIGHT)
+
+
+def find_group(role: str, name: str) -> bpy.types.ShaderNodeTree | None:
+    """Find a local node group by the role stamped on it, preferring the one still so named."""
+    named = bpy.data.node_groups.get(name)
+    if named is not None and named.library is None and named.get(ids.ROLE_KEY) == role:
+        return named
+    for group in bpy.data.node_groups:
+        if group.library is None and group.get(ids.ROLE_KEY) == role:
+            return group
+    return None
+
+
+def ensure_group(
+    name: str, role: str, version: int, build: Callable[[TreeBuilder], None]
+) -> bpy.types.ShaderNodeTree:
+    """Return the static group of that role, rebuilt in place if it is of an older version.
+
+    `build` declares the interface with `declare` and adds the nodes.
+    """
+    group = find_group(role, name)
+    if group is not None and group.get(ids.VERSION_KEY) == version and is_intact(group):
+        return group
+    if group is None:
+        group = bpy.data.node_groups.new(name, "ShaderNodeTree")
+        group[ids.ROLE_KEY] = role
+    rebuild(group, build)
+    group[ids.VERSION_KEY] = version
+    return group
+
+
+def is_intact(tree: bpy.types.ShaderNodeTree) -> bool:
+    """Tell whether nothing that the tree's nodes refer to was deleted (a group, the table)."""
+    for node in tree.nodes:
+        if node.type == "GROUP" and (node.node_tree is None or not is_intact(node.node_tree)):
+            return False
+        if node.type == "TEX_IMAGE" and node.image is None:
+            return False
+    return any(node.type == "GROUP_OUTPUT" for node in tree.nodes)
+
+
+def rebuild(group: bpy.types.ShaderNodeTree, build: Callable[[TreeBuilder], None]) -> None:
+    """Replace the nodes of a group; its interface is kept where `build` declares the same."""
+    if group.animation_data is not None:
+        group.animation_data_clear()
+    group.nodes.clear()
+    builder = TreeBuilder(group)
+    build(builder)
+    builder.arrange()
+
+
+def declare(
+    tree: bpy.types.ShaderNodeTree,
+    name: str,
+    kind: str = "Float",
+    *,
+    output: bool = False,
+    default: Any = None,
+    low: float | None = None,
+    high: float | None = None,
+    subtype: str = "",
+    hide_value: bool = False,
+    tip: str = "",
+) -> None:
+    """Declare a socket of a group's interface unless it is there already."""
+    side = "OUTPUT" if output else "INPUT"
+    for item in tree.interface.items_tree:
+        if item.item_type == "SOCKET" and item.in_out == side and item.name == name:
+            return
+    item = tree.interface.new_socket(
+        name, in_out=side, socket_type=f"NodeSocket{kind}", description=tip
+    )
+    if subtype:
+        item.subtype = subtype
+    item.hide_value = hide_value
+    if low is not None:
+        item.min_value = low
+    if high is not None:
+        item.max_value = high
+    if default is not None:
+        item.default_value = default

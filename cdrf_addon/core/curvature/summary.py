@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a whole mesh's curvature amounts to: flat, constant or varying, and its usual range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .field import CurvatureField
+from .mesh import TriMesh
+
+FLAT, CONSTANT, VARYING = "FLAT", "CONSTANT", "VARYING"
+
+# A mesh whose kappa stays within this of its mean is rendered with one kappa: f changes by less
+# than max(sigma df/dsigma) = 0.2 times this, 1e-3 of the peak.
+CONSTANT_TOLERANCE = 0.005
+# kappa times the mesh's size below which bending is invisible (and float32 noise of a plane).
+FLAT_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class CurvatureSummary:
+    """Curvature of a mesh in a few numbers, per unit of length."""
+
+    kind: str
+    """FLAT, CONSTANT or VARYING."""
+    low: float
+    """5th percentile of kappa."""
+    median: float
+    high: float
+    """95th percentile of kappa; the maximum of a real mesh is a crease and says little."""
+    mean_high: float
+    """95th percentile of the absolute mean curvature."""
+    mean_values: tuple[float, float, float, float]
+    """Means of kappa, k1, k2 and signed mean curvature."""
+
+
+def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
+    """Classify the curvature at the vertices that belong to a face."""
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[mesh.triangles] = True
+    used &= np.isfinite(mesh.vertices).all(axis=1)
+    kappa = field.kappa[used]
+    low, median, high = np.percentile(kappa, (5.0, 50.0, 95.0))
+    means = tuple(
+        float(values[used].mean()) for values in (field.kappa, field.k1, field.k2, field.mean)
+    )
+    points = mesh.vertices[used]
+    size = float(np.ptp(points, axis=0).max())
+    kind = VARYING
+    if kappa.max() == 0.0 or kappa.max() * size <= FLAT_TOLERANCE:
+        kind = FLAT
+    elif kappa.max() - kappa.min() <= 2.0 * CONSTANT_TOLERANCE * kappa.mean():
+        # Equal kappa is not enough: k1, k2 are kept for what a pixel may need later.
+        spread = max(np.ptp(field.k1[used]), np.ptp(field.k2[used]))
+        if spread <= 4.0 * CONSTANT_TOLERANCE * kappa.mean():
+            kind = CONSTANT
+    mean_high = float(np.percentile(np.abs(field.mean[used]), 95.0))
+    return CurvatureSummary(kind, float(low), float(median), float(high), mean_high, means)  # type: ignore[arg-type]
+
+
+FLAT_SUMMARY = CurvatureSummary(FLAT, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+"""Of a mesh that bends nowhere."""

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel: in the 3D View's sidebar (tab CDRF) and in the material's properties."""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+from .. import ids
+from ..blender import state
+from ..blender.display import curvature as display
+from ..blender.material import install as materials
+from ..blender.material import model as reflectance_models
+from ..blender.material import specular as gloss
+from ..blender.shader import group as shader
+from ..blender.world import light as world
+from ..compat import EEVEE, HAS_RAYCAST
+from ..core.curvature.estimators import METHODS
+from ..core.curvature.summary import CONSTANT, FLAT, VARYING
+from ..core.reflectance.models import MODEL_ITEMS, PROFILE
+
+_MOST_LINES = 6
+
+
+def _wrapped(layout: bpy.types.UILayout, text: str, width: int, icon: str = "NONE") -> None:
+    for number, line in enumerate(textwrap.wrap(text, max(width, 20))):
+        layout.label(text=line, icon=icon if number == 0 else "BLANK1")
+
+
+def _characters(context: bpy.types.Context) -> int:
+    scale = context.preferences.system.ui_scale
+    return int((context.region.width - 60.0 * scale) / (7.0 * scale))
+
+
+def draw_skin(
+    layout: bpy.types.UILayout, context: bpy.types.Context, material: bpy.types.Material
+) -> None:
+    """Draw the controls of a translucent material."""
+    node = materials.cdrf_node(material)
+    assert node is not None
+    column = layout.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    column.enabled = material.is_editable
+    if node.inputs[ids.SIGMA0].is_linked:
+        column.label(text="Scatter Distance comes from a node")
+    else:
+        # The socket itself, so that I keyframes it and a file without the extension plays it.
+        column.prop(node.inputs[ids.SIGMA0], "default_value", text="Scatter \u03c3\u2080")
+    column.prop(material.cdrf, "sigma0_ratio", text="Ratio R, G, B")
+    if not node.inputs[ids.BASE_COLOR].is_linked:
+        column.prop(node.inputs[ids.BASE_COLOR], "default_value", text="Base Color")
+    column.prop(node.inputs[ids.STRENGTH], "default_value", text="Strength")
+    if ids.DETAIL_SIZE in node.inputs:
+        column.prop(node.inputs[ids.DETAIL_SIZE], "default_value", text="Detail Size")
+    column.prop(material.cdrf, "shadows")
+    shadowed = shader.stamped_variant(node.node_tree).shadows
+    if shadowed.cast and HAS_RAYCAST:
+        column.prop(material.cdrf, "shadow_edges")
+    wired = shader.wired_lights(node.node_tree)
+    lookups = sum(len(shared.split()) for *_, shared in wired)
+    plural = "" if lookups == 1 else "s"
+    text = f"{lookups} look-up{plural} for {len(wired)} light(s)"
+    text += ", shadows" if shadowed.cast else ""
+    layout.label(text=text, icon="TEXTURE")
+    if not material.is_editable:
+        _wrapped(layout, "Linked: make it local to change it.", _characters(context), "LINKED")
+
+
+def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None:
+    """Draw the choice of model, and of scatter distances that others have measured."""
+    kind = reflectance_models.kind_of_model(material)
+    name = next(item[1] for item in MODEL_ITEMS if item[0] == kind)
+    row = layout.row(align=True)
+    row.operator_menu_enum("cdrf.set_model", "model", text=name, icon="SHADING_TEXTURE")
+    row.operator_menu_enum("cdrf.preset", "preset", text="Preset", icon="PRESET")
+    row.operator("cdrf.read_shader", text="", icon="EYEDROPPER")
+    row = layout.row(align=True)
+    row.operator("cdrf.measure", icon="RENDER_STILL")
+    row.operator("cdrf.fit", icon="GRAPH")
+    if kind == PROFILE:
+        column = layout.column()
+        column.prop(material.cdrf, "profile", text="")
+        column.prop(material.cdrf, "profile_base", expand=False)
+        problem = reflectance_models.profile_problem(material)
+        if problem:
+            column.label(text=problem, icon="ERROR")
+
+
+def draw_ambient(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
+    """Draw what of the world's light reaches the material, and its occlusion."""
+    node = materials.cdrf_node(skin)
+    assert node is not None
+    light = world.stamped(node.node_tree)
+    if light is None:
+        layout.label(text="No light from the world", icon="WORLD")
+        return
+    text = {
+        world.FIXED: "World as of the last Update",
+        world.SCALED: "World; its strength is followed",
+    }.get(light.kind, "World; colour and strength followed")
+    if light.rotation():
+        text = "World; strength and rotation followed"
+    if light.environment.sun is not None:
+        text += ", with a sun"
+    layout.label(text=text, icon="WORLD")
+    row = layout.row(align=True)
+    row.enabled = skin.is_editable
+    row.prop(skin.cdrf, "ambient_occlusion", toggle=True)
+    if ids.OCCLUSION_DISTANCE in node.inputs:
+        row.prop(node.inputs[ids.OCCLUSION_DISTANCE], "default_value", text="Distance")
+
+
+def draw_gloss(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
+    """Draw the switch of the gloss, where the material has any to keep."""
+    if gloss.find_principled(skin) is not None:
+        row = layout.row()
+        row.enabled = skin.is_editable
+        row.prop(skin.cdrf, "gloss", text="Gloss of Principled BSDF", toggle=True, icon="MATERIAL")
+
+
+def draw_display(
+    layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.types.Material
+) -> None:
+    """Draw the buttons that show curvature in colours, and the one that removes translucency."""
+    row = layout.row(align=True)
+    shown = display.shows_curvature(skin)
+    button = row.operator(
+        "cdrf.show_curvature",
+        text="Show Skin" if shown else "Show Curvature",
+        icon="HIDE_OFF",
+        depress=shown,
+    )
+    button.display = "OFF" if shown else "ON"
+    row.operator("cdrf.remove", text="", icon="TRASH")
+    kept = context.scene.get(ids.DISPLAY_KEY)
+    if not shown or kept is None:
+        return
+    row = layout.row(align=True)
+    for quantity, text in (("KAPPA", "Measured"), ("DIFFUSED", "Rendered"), ("MEAN", "Signed")):
+        button = row.operator(
+            "cdrf.show_curvature", text=text, depress=kept["quantity"] == quantity
+        )
+        button.display, button.quantity = "ON", quantity
+    row.operator("cdrf.save_curvature", text="", icon="RENDER_STILL")
+
+
+def draw_state(
+    layout: bpy.types.UILayout, context: bpy.types.Context, item: bpy.types.Object
+) -> None:
+    """Draw what is known of the object's curvature, and what is out of date."""
+    known = item.data.cdrf
+    width = _characters(context)
+    box = layout.box().column(align=True)
+    if known.kind == FLAT:
+        box.label(text="Flat: nothing to scatter", icon="MESH_PLANE")
+    elif known.kind == CONSTANT:
+        box.label(text=f"Curvature {known.mean_values[0]:.4g} everywhere", icon="SPHERE")
+    else:
+        box.label(text=f"Curvature {known.low:.3g} to {known.high:.3g}", icon="SPHERECURVE")
+        box.label(text=f"Median {known.median:.3g}, radius {1 / max(known.median, 1e-9):.3g}")
+    box.label(text=f"{known.evaluated_vertices:,} vertices in {known.seconds:.2f} s", icon="TIME")
+    if known.kind == VARYING:
+        method = METHODS[known.method].label if known.method in METHODS else known.method
+        box.label(text=f"{method}, {known.radius} rings", icon="MOD_SMOOTH")
+    for line in known.warnings.splitlines()[:_MOST_LINES]:
+        _wrapped(box, line, width, "INFO")
+    playing = bool(context.screen and context.screen.is_animation_playing)
+    reasons = state.reasons_to_update(item, context.scene, context.view_layer, playing=playing)
+    if reasons:
+        due = layout.box().column(align=True)
+        due.alert = True
+        for reason in reasons[:_MOST_LINES]:
+            _wrapped(due, reason, width, "ERROR")
+        due.operator("cdrf.update", icon="FILE_REFRESH")
+    else:
+        row = layout.row()
+        row.label(text="Up to date", icon="CHECKMARK")
+        row.operator("cdrf.update", text="", icon="FILE_REFRESH")
+
+
+class _View3D:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "CDRF"
+
+
+class CDRF_PT_main(_View3D, bpy.types.Panel):
+    """The one button, and the state of the active object."""
+
+    bl_label = "Translucency"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        item = context.active_object
+        skin = materials.active_skin(item)
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator("cdrf.setup", icon="SHADING_RENDERED")
+        if context.mode != "OBJECT":
+            layout.label(text="Leave this mode to continue (Tab)", icon="INFO")
+        elif item is None or item.type != "MESH":
+            layout.label(text="Select a mesh object", icon="INFO")
+        if skin is None:
+            return
+        engine = context.scene.render.engine
+        if engine != EEVEE:
+            layout.label(text="Shown by EEVEE only", icon="INFO")
+            layout.prop(context.scene.render, "engine", text="Render Engine")
+        layout.label(text=skin.name, icon="MATERIAL")
+        draw_skin(layout, context, skin)
+        draw_model(layout, skin)
+        draw_ambient(layout, skin)
+        draw_gloss(layout, skin)
+        draw_display(layout, context, skin)
+        draw_state(layout, context, item)
+
+
+class CDRF_PT_material(bpy.types.Panel):
+    """The same controls among the material's properties."""
+
+    bl_label = "Translucency (CDRF)"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "material"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.object is not None and context.object.type == "MESH"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        material = context.object.active_material
+        if materials.cdrf_node(material) is None:
+            button = layout.operator("cdrf.setup", icon="SHADING_RENDERED")
+            button.only_active_slot = button.only_active_object = True
+            return
+        draw_skin(layout, context, material)
+        draw_model(layout, material)
+        draw_ambient(layout, material)
+        draw_gloss(layout, material)
+        draw_state(layout, context, context.object)
+
+
+CLASSES = (CDRF_PT_main, CDRF_PT_material)
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)
