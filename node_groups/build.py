@@ -19,11 +19,18 @@ sys.path.insert(0, str(HERE.parent))
 
 import bpy  # noqa: E402  (the checkout must be importable first)
 
-from cdrf_addon.blender.material import specular as gloss  # noqa: E402
-from cdrf_addon.blender.nodes import groups  # noqa: E402
+from cdrf_addon.blender.material.specular import under_gloss_group  # noqa: E402
+from cdrf_addon.blender.nodes.curvature import diffused_group, display_group  # noqa: E402
+from cdrf_addon.blender.nodes.detail import detail_group  # noqa: E402
+from cdrf_addon.blender.nodes.harmonics import bands_group, harmonics_group  # noqa: E402
+from cdrf_addon.blender.nodes.lights import area_group, light_group  # noqa: E402
+from cdrf_addon.blender.nodes.received import lit_group  # noqa: E402
+from cdrf_addon.blender.nodes.reflectance import (  # noqa: E402
+    CHANNEL_SETS,
+    SEPARATE,
+    reflectance_group,
+)
 from cdrf_addon.blender.nodes.tables import ensure_table  # noqa: E402
-from cdrf_addon.blender.shader import ambient as ambient_nodes  # noqa: E402
-from cdrf_addon.blender.shader import shadows  # noqa: E402
 from cdrf_addon.core.reflectance.models import name_of, profile, ring, sphere  # noqa: E402
 
 ASSET_FILE = HERE / "cdrf.blend"
@@ -53,30 +60,30 @@ DESCRIPTIONS = {
 def build_all() -> list[bpy.types.ShaderNodeTree]:
     """Build every static group in an empty file."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    built = [groups.light_group(kind) for kind in ("SUN", "POINT", "SPOT")]
-    built += [groups.area_group(elliptic=elliptic) for elliptic in (False, True)]
+    built = [light_group(kind) for kind in ("SUN", "POINT", "SPOT")]
+    built += [area_group(elliptic=elliptic) for elliptic in (False, True)]
     built += [
-        groups.reflectance_group(channels, ensure_table(model))
+        reflectance_group(channels, ensure_table(model))
         for model in (sphere(), ring(), profile())
-        for channels in groups.CHANNEL_SETS
+        for channels in CHANNEL_SETS
     ]
     built += [
-        groups.reflectance_group(groups.SEPARATE, ensure_table(model), own_cosines=True)
+        reflectance_group(SEPARATE, ensure_table(model), own_cosines=True)
         for model in (sphere(), profile())
     ]
     built += [
-        ambient_nodes.bands_group(channels, ensure_table(model))
+        bands_group(channels, ensure_table(model))
         for model, channels in (
             (sphere(), "RGB"),
-            (sphere(), groups.SEPARATE),
+            (sphere(), SEPARATE),
             (ring(), "RGB"),
             (profile(), "RGB"),
         )
     ]
-    built += [ambient_nodes.harmonics_group(), groups.detail_group(), gloss.under_gloss_group()]
-    built.append(groups.diffused_group())
-    built += [shadows.lit_group(translucent=translucent) for translucent in (False, True)]
-    built += [groups.display_group(signed=signed) for signed in (False, True)]
+    built += [harmonics_group(), detail_group(), under_gloss_group()]
+    built.append(diffused_group())
+    built += [lit_group(translucent=translucent) for translucent in (False, True)]
+    built += [display_group(signed=signed) for signed in (False, True)]
     return built
 
 

@@ -150,16 +150,16 @@ def test_soft_lights_cost_a_profile_three_look_ups_and_resizing_is_noticed(
     egg: bpy.types.Object, rig: Rig
 ) -> None:
     from cdrf_addon.blender import state
-    from cdrf_addon.blender.shader import group as shader
+    from cdrf_addon.blender.shader.wired import wired_lights
 
     egg.active_material.cdrf.model = PROFILE
-    assert [looks for *_, looks in shader.wired_lights(group_of(egg))] == ["RGB"]
+    assert [light.lookups for light in wired_lights(group_of(egg))] == ["RGB"]
     sun = next(item for item in rig.scene.objects if item.type == "LIGHT")
     sun.data.angle = math.radians(10.0)
     reasons = state.reasons_to_update(egg, rig.scene, bpy.context.view_layer)
     assert any("another size" in reason for reason in reasons)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    assert [looks for *_, looks in shader.wired_lights(group_of(egg))] == ["R G B"]
+    assert [light.lookups for light in wired_lights(group_of(egg))] == ["R G B"]
     assert not state.reasons_to_update(egg, rig.scene, bpy.context.view_layer)
 
 

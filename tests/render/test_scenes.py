@@ -16,8 +16,8 @@ from tolerances import WRITTEN
 from cdrf_addon import ids
 from cdrf_addon.blender import setup, state
 from cdrf_addon.blender.material.lighting import lit_elsewhere
-from cdrf_addon.blender.shader import group as shader
-from cdrf_addon.blender.shader.shadows import choose
+from cdrf_addon.blender.material.shadow_choice import choose_shadows
+from cdrf_addon.blender.shader.bits import light_bits
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 Array = NDArray[np.float64]
@@ -284,10 +284,10 @@ def test_shadows_do_not_depend_on_which_view_layer_is_open(rig: Rig) -> None:
     bare = rig.scene.view_layers.new("Bare")
     bare.layer_collection.children["Hats"].exclude = True
     skin = ball.data.materials[0]
-    assert choose(skin, rig.scene.view_layers[0]).cast and choose(skin, bare).cast
+    assert choose_shadows(skin, rig.scene.view_layers[0]).cast and choose_shadows(skin, bare).cast
     own.hide_render = True
     hat.hide_render = True
-    assert not choose(skin, bare).cast
+    assert not choose_shadows(skin, bare).cast
 
 
 def test_a_renamed_scene_keeps_its_skins(rig: Rig) -> None:
@@ -332,12 +332,12 @@ def test_lights_never_share_a_place_in_the_objects_property(rig: Rig) -> None:
     bpy.context.view_layer.update()
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     group = cdrf_node(ball).node_tree
-    assert sorted(shader.light_bits(group).values()) == [0, 1]
+    assert sorted(light_bits(group).values()) == [0, 1]
     # As after appending what another file numbered by itself.
     for node in group.nodes:
         if ids.BIT_KEY in node:
             node[ids.BIT_KEY] = 0
     assert "another place" in reasons(ball)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    assert len(set(shader.light_bits(cdrf_node(ball).node_tree).values())) == 2
+    assert len(set(light_bits(cdrf_node(ball).node_tree).values())) == 2
     assert reasons(ball) == ""
