@@ -35,7 +35,7 @@ from cdrf_addon.core.reflectance.models import name_of, profile, ring, sphere  #
 
 ASSET_FILE = HERE / "cdrf.blend"
 TOPOLOGY_FILE = HERE / "topology.txt"
-SKIN_GROUP = f"CDRF Reflectance {name_of(profile().key)} RGB"
+PROFILE_GROUP = f"CDRF Reflectance {name_of(profile().key)} RGB"
 DESCRIPTIONS = {
     "CDRF Sun": "Direction, radiance and blur of a sun for CDRF Reflectance",
     "CDRF Point": "Direction, radiance and blur of a point light for CDRF Reflectance",
@@ -46,7 +46,7 @@ DESCRIPTIONS = {
     "CDRF Reflectance Sphere R+G+B": "Diffusion on a sphere, a sigma for each channel",
     "CDRF Reflectance Ring RGB": "f(theta, sigma) of Kubo et al. 2011, one sigma for all channels",
     "CDRF Reflectance Ring R+G+B": "f(theta, sigma) of Kubo et al. 2011, a sigma for each channel",
-    SKIN_GROUP: "f(theta, sigma) of layered skin (d'Eon and Luebke 2007) in one look-up",
+    PROFILE_GROUP: "f(theta, sigma) of layered skin (d'Eon and Luebke 2007) in one look-up",
     "CDRF Bands Sphere R+G+B": "What diffusion on a sphere leaves of a world's bands",
     "CDRF Harmonics": "A world's light on a surface, as nine harmonics of three colours",
     "CDRF Detail": "Part of a normal map's detail that a scatter distance leaves",
@@ -90,8 +90,8 @@ def build_all() -> list[bpy.types.ShaderNodeTree]:
 def describe(tree: bpy.types.ShaderNodeTree) -> str:
     """Write a tree's interface and wiring as text, one link or constant a line."""
     lines = [f"# {tree.name}"]
-    for item in tree.interface.items_tree:
-        lines.append(f"{item.in_out.lower()} {item.name}: {item.socket_type}")
+    for socket in tree.interface.items_tree:
+        lines.append(f"{socket.in_out.lower()} {socket.name}: {socket.socket_type}")
     for node in tree.nodes:
         kind = getattr(node, "operation", "") or getattr(node, "projection", "")
         inner = f" ({node.node_tree.name})" if node.type == "GROUP" else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world's light on the skin: against theory, Cycles, and EEVEE's own Diffuse BSDF."""
+"""The world's light on translucent surfaces: theory, Cycles, and EEVEE's own Diffuse BSDF."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from cdrf_addon.core.reflectance.models import PROFILE, RING, profile, ring, sph
 
 @pytest.fixture
 def rig(rig: Rig) -> Rig:
-    """The world's light is smooth: fewer pixels say as much."""
+    """The world's light is smooth: fewer pixels show as much."""
     rig.scene.render.resolution_x = rig.scene.render.resolution_y = 64
     return rig
 
@@ -61,12 +61,12 @@ def white(rig: Rig) -> bpy.types.Object:
     return ball
 
 
-def due(rig: Rig, item: bpy.types.Object) -> list[str]:
-    return state.reasons_to_update(item, rig.scene, bpy.context.view_layer)
+def due(rig: Rig, obj: bpy.types.Object) -> list[str]:
+    return state.reasons_to_update(obj, rig.scene, bpy.context.view_layer)
 
 
-def kinds(item: bpy.types.Object) -> list[str]:
-    return [node.bl_idname for node in cdrf_node(item).node_tree.nodes]
+def kinds(obj: bpy.types.Object) -> list[str]:
+    return [node.bl_idname for node in cdrf_node(obj).node_tree.nodes]
 
 
 @pytest.mark.smoke
@@ -245,7 +245,7 @@ def test_a_saved_file_knows_its_world(rig: Rig, tmp_path, monkeypatch) -> None:
 
 
 def test_the_camera_may_see_another_world(rig: Rig) -> None:
-    """Light Path > Is Camera Ray hides the light from the camera, not from the skin."""
+    """Light Path > Is Camera Ray hides the light from the camera, not from the surface."""
     tree = rig.scene.world.node_tree
     path = tree.nodes.new("ShaderNodeLightPath")
     mix = tree.nodes.new("ShaderNodeMix")

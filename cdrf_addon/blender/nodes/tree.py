@@ -242,18 +242,18 @@ def declare(
         tip: Tooltip.
     """
     side = "OUTPUT" if output else "INPUT"
-    for item in tree.interface.items_tree:
-        if item.item_type == "SOCKET" and item.in_out == side and item.name == name:
+    for socket in tree.interface.items_tree:
+        if socket.item_type == "SOCKET" and socket.in_out == side and socket.name == name:
             return
-    item = tree.interface.new_socket(
+    socket = tree.interface.new_socket(
         name, in_out=side, socket_type=f"NodeSocket{kind}", description=tip
     )
     if subtype:
-        item.subtype = subtype
-    item.hide_value = hide_value
+        socket.subtype = subtype
+    socket.hide_value = hide_value
     if low is not None:
-        item.min_value = low
+        socket.min_value = low
     if high is not None:
-        item.max_value = high
+        socket.max_value = high
     if default is not None:
-        item.default_value = default
+        socket.default_value = default
