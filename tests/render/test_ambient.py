@@ -8,6 +8,7 @@ import math
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 from rig import Rig, cdrf_node, diffuse_material
 from tolerances import WORLD_CYCLES, WRITTEN
 
@@ -242,6 +243,28 @@ def test_a_saved_file_knows_its_world(rig: Rig, tmp_path, monkeypatch) -> None:
     assert before is not None and after is not None
     assert np.array_equal(before.environment.harmonics, after.environment.harmonics)
     assert after.world == scene.world
+
+
+def test_a_flat_mesh_is_lit_by_a_pictures_sun_alone(rig: Rig) -> None:
+    """Without a light of the scene nothing but the sun depends on the variance."""
+    picture(rig, sunny())
+    bpy.ops.mesh.primitive_plane_add(size=1.0)
+    plane = bpy.context.object
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    node = cdrf_node(plane)
+    node.inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
+    light = stamped(node.node_tree)
+    assert light is not None and light.environment.sun is not None
+    sun = light.environment.sun
+    # Turned halfway from the sun to the camera, so that both see it.
+    normal = (Vector(sun.direction) + Vector((0.0, -1.0, 0.0))).normalized()
+    plane.rotation_euler = normal.to_track_quat("Z", "Y").to_euler()
+    expected = lit_by(light.environment.harmonics, tuple(normal), np.ones((3, 3)))
+    expected = expected + np.array(sun.radiance) * normal.dot(Vector(sun.direction))
+    pixels = rig.render()
+    found = pixels[pixels[..., 3] > 0.999][:, :3]
+    assert np.abs(found / expected - 1.0).max() <= 2e-3
+    assert due(rig, plane) == []
 
 
 def test_the_camera_may_see_another_world(rig: Rig) -> None:

@@ -19,11 +19,11 @@ import bpy
 from ... import ids
 from ..lights.scene_lights import SceneLight
 from ..nodes.tables import Table
-from ..nodes.tree import Sockets, TreeBuilder, declare
+from ..nodes.tree import Operand, Sockets, TreeBuilder, declare
 from ..world.light import WorldLight
 from .curvature import surface_variance
 from .lights import add_lights, add_visibilities, sum_lights
-from .surface import Surface, surface_normals
+from .surface import Normals, Surface, surface_normals
 from .variant import CONSTANT, Variant
 from .visibility import thickness
 from .world import add_world, filters_world
@@ -78,8 +78,8 @@ def _surface(
     given: Sockets,
 ) -> Surface:
     """Add what all lights share, as far as something depends on it."""
-    normals = {}
-    variance = None
+    normals: Normals = {}
+    variance: Operand = (0.0, 0.0, 0.0)
     if lights or (world is not None and not world.environment.is_uniform):
         normals = surface_normals(b, variant, table, given)
     if lights or (world is not None and filters_world(variant, world, table)):

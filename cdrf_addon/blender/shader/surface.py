@@ -40,8 +40,8 @@ class Surface:
     """Of the reflectance model."""
     normals: Normals
     """Empty where no light depends on the normal."""
-    variance: Operand | None
-    """Square of sigma per channel; None where nothing depends on it."""
+    variance: Operand
+    """Square of sigma per channel; zero where the surface changes no light."""
 
 
 def surface_normals(b: TreeBuilder, variant: Variant, table: Table, given: Sockets) -> Normals:
@@ -132,7 +132,6 @@ def _total_variance(b: TreeBuilder, surface: Surface, light: Socket, lookups: st
     A channel whose blur is sqrt(m) sigma wide needs 1 / m of the light's variance on top of
     sigma^2; channels that share a look-up take that of the widest.
     """
-    assert surface.variance is not None
     if not surface.table.colour:
         return b.vector("ADD", surface.variance, light)
     moments = dict(zip("RGB", surface.table.moments, strict=True))

@@ -58,7 +58,6 @@ def add_world(
     environment, table = world.environment, surface.table
     bands = None
     if filters_world(variant, world, table):
-        assert surface.variance is not None
         node = b.group(bands_group(variant.channels, table), "Bands", Variance=surface.variance)
         bands = node.outputs
     rotation = _rotation(b, world)
