@@ -42,7 +42,7 @@ from scipy.sparse.linalg import splu  # noqa: E402
 from scipy.spatial import cKDTree  # noqa: E402
 
 from cdrf_addon.compat import ensure_node_tree  # noqa: E402
-from cdrf_addon.core.reflectance.ring import reflectance  # noqa: E402
+from cdrf_addon.core.reflectance.ring_model import reflectance  # noqa: E402
 
 Array = NDArray[np.float64]
 

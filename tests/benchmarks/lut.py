@@ -41,7 +41,7 @@ from cdrf_addon.core.reflectance.lut import (  # noqa: E402
     build_lut,
     sample_lut,
 )
-from cdrf_addon.core.reflectance.models import (  # noqa: E402
+from cdrf_addon.core.reflectance.model import (  # noqa: E402
     RING,
     SKIN_PROFILE,
     SPHERE,

@@ -14,7 +14,7 @@ from cdrf_addon import ids
 from cdrf_addon.blender.material.scattering import read_scattering
 from cdrf_addon.blender.nodes.tables import ensure_table, find_table
 from cdrf_addon.compat import ensure_node_tree, walk_method
-from cdrf_addon.core.reflectance.models import (
+from cdrf_addon.core.reflectance.model import (
     PROFILE,
     RING,
     SKIN_PROFILE,

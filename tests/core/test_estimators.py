@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from surfaces import ALL_SURFACES, Surface
 
+from cdrf_addon.core.curvature.clean import TriMesh
 from cdrf_addon.core.curvature.estimators import METHODS
 from cdrf_addon.core.curvature.field import CurvatureField, principal_curvatures
-from cdrf_addon.core.curvature.mesh import TriMesh
 from cdrf_addon.core.errors import ParameterError
-from tests.core.test_curvature import mixed_mesh
-from tests.core.test_mesh import icosphere
+from tests.core.test_clean import icosphere
+from tests.core.test_field import mixed_mesh
 
 # RMS and worst error of kappa at about 10,000 vertices, in % of the surface's RMS kappa, away from
 # borders. Measured and rounded up by a third or less; results/estimators.md has the whole table. On

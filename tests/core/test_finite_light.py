@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cdrf_addon.core.reflectance.finite_light import RING_GAIN, SPHERE_GAIN, finite_light
-from cdrf_addon.core.reflectance.ring import reflectance
+from cdrf_addon.core.reflectance.ring_model import reflectance
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 pytestmark = pytest.mark.smoke

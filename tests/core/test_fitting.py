@@ -18,7 +18,7 @@ from cdrf_addon.core.measured.material_fit import (
     sigma_per_scale,
 )
 from cdrf_addon.core.measured.measurement import SphereMeasurement, equator_weights
-from cdrf_addon.core.reflectance.ring import reflectance
+from cdrf_addon.core.reflectance.ring_model import reflectance
 
 SEED = 20111106
 COSINE = np.linspace(-0.96, 0.96, 72)

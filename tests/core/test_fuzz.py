@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from cdrf_addon.core.curvature.clean import NO_CREASE, CleanMesh, TriMesh, shared_edges
 from cdrf_addon.core.curvature.estimators import METHODS
 from cdrf_addon.core.curvature.field import CleanCurvature, Options, curvature_steps
-from cdrf_addon.core.curvature.mesh import NO_CREASE, CleanMesh, TriMesh, shared_edges
 from cdrf_addon.core.curvature.scale_space import LEVELS, level_steps
 from cdrf_addon.core.curvature.summary import summarise
 from cdrf_addon.core.errors import CdrfError

@@ -16,7 +16,7 @@ from cdrf_addon.core.reflectance.lut import (
     sample_lut,
     sigma_axis,
 )
-from cdrf_addon.core.reflectance.models import PROFILE, RING, SPHERE, Model, profile, ring, sphere
+from cdrf_addon.core.reflectance.model import PROFILE, RING, SPHERE, Model, profile, ring, sphere
 
 pytestmark = pytest.mark.smoke
 

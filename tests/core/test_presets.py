@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from cdrf_addon.core.errors import ParameterError
-from cdrf_addon.core.reflectance.models import PROFILE, SKIN_PROFILE, SPHERE
+from cdrf_addon.core.reflectance.model import PROFILE, SKIN_PROFILE, SPHERE
 from cdrf_addon.core.scattering.dipole import Medium
 from cdrf_addon.core.scattering.presets import ARTIST, PRESETS, in_units
 

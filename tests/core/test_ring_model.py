@@ -16,7 +16,7 @@ from references import SIGMAS as LISTED
 from references import reference_error, ring_reference
 
 from cdrf_addon.core.errors import CdrfError, ParameterError
-from cdrf_addon.core.reflectance.ring import SERIES_FROM, reflectance, series_remainder
+from cdrf_addon.core.reflectance.ring_model import SERIES_FROM, reflectance, series_remainder
 
 pytestmark = pytest.mark.smoke
 

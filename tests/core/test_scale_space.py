@@ -8,11 +8,11 @@ import pytest
 from scipy.spatial import cKDTree
 from surfaces import ellipsoid, noisy, torus
 
+from cdrf_addon.core.curvature.clean import TriMesh
 from cdrf_addon.core.curvature.field import curvature_steps
-from cdrf_addon.core.curvature.mesh import TriMesh
 from cdrf_addon.core.curvature.scale_space import LEVEL_RATIO, LEVELS, KappaLevels, level_steps
 from cdrf_addon.core.progress import run_steps
-from tests.core.test_mesh import plane
+from tests.core.test_clean import plane
 
 # Difference between the finest levels of 2,000 and of 60,000 vertices, in units of the mean kappa:
 # the coarse mesh's own error of curvature, some percent.

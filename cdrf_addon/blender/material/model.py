@@ -18,7 +18,7 @@ from ... import ids
 from ...compat import animation_curves, walk_method
 from ...core.errors import ParameterError, SceneError
 from ...core.reflectance.detail import DETAIL_PER_SIGMA0
-from ...core.reflectance.models import (
+from ...core.reflectance.model import (
     DEFAULT_KIND,
     MEASURED,
     PROFILE,

@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 
 from ... import ids
+from ...core.curvature.clean import TriMesh
 from ...core.curvature.field import Options
-from ...core.curvature.mesh import TriMesh
 from ...core.curvature.summary import VARYING
 from ...core.curvature.topology import edge_lengths
 from ...core.errors import MeshError

@@ -24,7 +24,7 @@ from ...core.curvature.scale_space import LENGTH_PER_SIGMA0, LEVEL_RATIO, LEVELS
 from ...core.reflectance.detail import PHASE
 from ...core.reflectance.finite_light import SPHERE_GAIN, VARIANCE_COEFFICIENTS
 from ...core.reflectance.lut import DEFAULT_LAYOUT, VARIANCE_MAX
-from ...core.reflectance.models import name_of
+from ...core.reflectance.model import name_of
 from .tables import Table
 from .tree import TreeBuilder, declare, ensure_group
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ... import ids
 from ...core.errors import SceneError
 from ...core.reflectance.lut import build_lut
-from ...core.reflectance.models import RING, SPHERE, Model, name_of, ring, sphere
+from ...core.reflectance.model import RING, SPHERE, Model, name_of, ring, sphere
 
 LUT_VERSION = 5
 

@@ -18,7 +18,7 @@ import numpy as np
 from ... import ids
 from ...core.reflectance.environment import BAND_ROWS, Sun, bands_of_table, shader_coefficients
 from ...core.reflectance.lut import DEFAULT_LAYOUT, VARIANCE_MAX
-from ...core.reflectance.models import SPHERE, name_of
+from ...core.reflectance.model import SPHERE, name_of
 from ..lights.scene_lights import drive
 from ..nodes.tables import Table, packed_image
 from ..nodes.tree import TreeBuilder, declare, ensure_group

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import bpy
 
 from ... import ids
-from ...core.reflectance.models import RING, SPHERE, name_of
+from ...core.reflectance.model import RING, SPHERE, name_of
 from ..lights.scene_lights import HARD_SUN, SceneLight, drive_light
 from ..nodes.groups import SEPARATE, detail_group, diffused_group, light_group, reflectance_group
 from ..nodes.shadow_edge import edge_group

@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..progress import with_progress
+from .clean import FLATNESS_LIMIT, repeated_faces
 from .estimators.least_squares import solve
-from .mesh import FLATNESS_LIMIT, repeated_faces
 from .topology import columns, dot, edge_lengths, face_normals, half_cotangents, parts, scatter
 
 if TYPE_CHECKING:
-    from .mesh import CleanMesh, Indices, Points
+    from .clean import CleanMesh, Indices, Points
 
 # Half a cotangent beyond this is a needle's (angles below 0.3 degrees): its negative weights are
 # left out and the others end here, as more only stalls the solver. All other triangles keep theirs,

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from .mesh import TriMesh, shared_edges, weld
+from .clean import TriMesh, shared_edges, weld
 from .topology import face_normals, runs_twice
 
 # Faces this close to one plane are one flat face; float32 positions of a plane lean less.

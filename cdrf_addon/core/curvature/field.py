@@ -15,14 +15,14 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..progress import counted, portion, run_steps
+from .clean import NO_CREASE, CleaningReport, CleanMesh, TriMesh, clean_steps
 from .estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
-from .mesh import NO_CREASE, CleaningReport, CleanMesh, TriMesh, clean_steps
 from .topology import adjacency, vertex_normals
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .mesh import Points
+    from .clean import Points
 
 # Rounds of filling bad vertices from their neighbours: holes of up to this many rings close.
 FILL_ROUNDS = 64

@@ -19,8 +19,8 @@ from ..progress import portion
 from .diffusion import Diffusion
 
 if TYPE_CHECKING:
+    from .clean import Points
     from .field import CleanCurvature
-    from .mesh import Points
 
 # Four fit into one colour attribute.
 LEVELS = 4

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .clean import CleaningReport, TriMesh
 from .field import CurvatureField
-from .mesh import CleaningReport, TriMesh
 from .topology import edge_lengths
 
 if TYPE_CHECKING:
-    from .mesh import Points
+    from .clean import Points
 
 # A bump of height h over one edge e bends by about h / e^2; this much of 1/r is allowed.
 BUMP_TOLERANCE = 0.005

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .clean import TriMesh
 from .field import CurvatureField
-from .mesh import TriMesh
 
 FLAT, CONSTANT, VARYING = "FLAT", "CONSTANT", "VARYING"
 

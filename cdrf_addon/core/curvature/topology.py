@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .mesh import Indices, Points
+    from .clean import Indices, Points
 
     Columns: TypeAlias = "Points | Sequence[Points]"
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..reflectance.ring import reflectance
+from ..reflectance.ring_model import reflectance
 from ..reflectance.sphere_model import sphere_reflectance
 
 if TYPE_CHECKING:

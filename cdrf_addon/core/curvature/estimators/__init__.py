@@ -17,7 +17,7 @@ from .polynomial import CUBIC, GOLDFEATHER, QUADRIC, polynomial_steps
 from .tensor import tensor_steps
 
 if TYPE_CHECKING:
-    from ..mesh import CleanMesh
+    from ..clean import CleanMesh
 
 Steps = Generator[float, None, Estimate]
 

@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..mesh import CleanMesh, Points
+    from ..clean import CleanMesh, Points
 
 # A neighbourhood grows with the square of the valence, and so do time and memory.
 VALENCE_LIMIT = 256

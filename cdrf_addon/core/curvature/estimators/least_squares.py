@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..mesh import Points
+    from ..clean import Points
 
 # Part of a diagonal entry that elimination must leave for the points to determine the fit.
 PIVOT_LIMIT = 1e-8

@@ -25,7 +25,7 @@ from .estimate import Estimate, fittable_faces
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..mesh import CleanMesh, Indices, Points
+    from ..clean import CleanMesh, Indices, Points
 
 # A chunk of this many vertices takes libigl about 0.15 s: short enough to feel alive.
 CHUNK_VERTICES = 16_384

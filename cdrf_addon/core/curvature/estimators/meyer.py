@@ -18,7 +18,7 @@ from .estimate import Estimate
 from .libigl import import_igl
 
 if TYPE_CHECKING:
-    from ..mesh import CleanMesh
+    from ..clean import CleanMesh
 
 
 def meyer_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:

@@ -35,7 +35,7 @@ from .tensor import tensor_steps
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..mesh import CleanMesh, Indices, Points
+    from ..clean import CleanMesh, Indices, Points
 
 Exponents = tuple[int, int]
 _Block = tuple["Indices", Estimate, "NDArray[np.bool_]"]

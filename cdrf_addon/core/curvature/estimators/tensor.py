@@ -18,7 +18,7 @@ from .estimate import Estimate
 from .least_squares import solve
 
 if TYPE_CHECKING:
-    from ..mesh import CleanMesh, Points
+    from ..clean import CleanMesh, Points
 
 
 def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:

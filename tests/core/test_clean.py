@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from cdrf_addon.core.curvature.mesh import EDGE_LIMIT, CleanMesh, TriMesh, clean, weld
+from cdrf_addon.core.curvature.clean import EDGE_LIMIT, CleanMesh, TriMesh, clean, weld
 from cdrf_addon.core.curvature.topology import edge_lengths
 from cdrf_addon.core.errors import MeshError
 

@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from cdrf_addon.core.curvature.clean import TriMesh
 from cdrf_addon.core.curvature.estimators import DEFAULT_METHOD, libigl, polynomial
 from cdrf_addon.core.curvature.field import CurvatureField, curvature_steps, principal_curvatures
-from cdrf_addon.core.curvature.mesh import TriMesh
 from cdrf_addon.core.curvature.topology import edge_lengths
 from cdrf_addon.core.errors import ParameterError
 from cdrf_addon.core.progress import run_steps
-from tests.core.test_mesh import grid_triangles, icosphere, moebius, plane, unweld
+from tests.core.test_clean import grid_triangles, icosphere, moebius, plane, unweld
 
 Surface = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Vertices, faces, and the exact k1 and k2 at the vertices."""

@@ -25,7 +25,7 @@ from ..arguments import checked
 from ..errors import ParameterError
 from .energy import conserving
 from .finite_light import RING_GAIN, SPHERE_GAIN
-from .ring import reflectance
+from .ring_model import reflectance
 from .sphere_model import sphere_reflectance
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import pytest
 from references import ANGLES, SIGMAS, Values, reference_error, ring_reference, sphere_reference
 
 from cdrf_addon.core.errors import CdrfError, ParameterError
-from cdrf_addon.core.reflectance.models import (
+from cdrf_addon.core.reflectance.model import (
     DEFAULT_KIND,
     MOST_GAUSSIANS,
     PROFILE,
@@ -24,7 +24,7 @@ from cdrf_addon.core.reflectance.models import (
     ring,
     sphere,
 )
-from cdrf_addon.core.reflectance.ring import reflectance
+from cdrf_addon.core.reflectance.ring_model import reflectance
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 pytestmark = pytest.mark.smoke
