@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 import pytest
+from small_meshes import grid_triangles, icosphere, plane
 
-from cdrf_addon.core.curvature.clean import TriMesh
 from cdrf_addon.core.curvature.field import CurvatureField, principal_curvatures
 from cdrf_addon.core.curvature.summary import CONSTANT, FLAT, VARYING, CurvatureSummary, summarise
-from tests.core.test_clean import grid_triangles, icosphere, plane
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 
 pytestmark = pytest.mark.smoke
 

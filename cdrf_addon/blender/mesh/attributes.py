@@ -13,10 +13,10 @@ import bpy
 import numpy as np
 
 from ... import ids
-from ...core.curvature.clean import TriMesh
 from ...core.curvature.field import Options
 from ...core.curvature.summary import VARYING
 from ...core.curvature.topology import edge_lengths
+from ...core.curvature.tri_mesh import TriMesh
 from ...core.errors import MeshError
 
 if TYPE_CHECKING:
