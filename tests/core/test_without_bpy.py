@@ -34,12 +34,12 @@ modules = {name: importlib.import_module(start + name) for name in names}
 # Opening Blender must not wait for these: they are loaded when something is computed.
 print("early:", sorted({"scipy", "igl"} & set(sys.modules)))
 
-value = float(modules["reflectance.ring_model"].reflectance(0.0, 0.3))
+value = float(modules["reflectance.ring_model"].ring_reflectance(0.0, 0.3))
 grid = [(x, y, -0.05 * (x * x + y * y)) for x in range(-3, 4) for y in range(-3, 4)]
 faces = []
 for corner in (7 * x + y for x in range(6) for y in range(6)):
     faces += [(corner, corner + 7, corner + 8), (corner, corner + 8, corner + 1)]
-mesh = modules["curvature.clean"].TriMesh.from_arrays(grid, faces)
+mesh = modules["curvature.tri_mesh"].TriMesh.from_arrays(grid, faces)
 mean = modules["curvature.field"].principal_curvatures(mesh).mean[24]
 print("blender:", sorted(set(BLENDER) & set(sys.modules)))
 print("modules:", " ".join(sorted(names)))

@@ -17,7 +17,8 @@ from cdrf_addon.blender.world import capture as world_capture
 from cdrf_addon.blender.world import light as world
 from cdrf_addon.core.errors import SceneError
 from cdrf_addon.core.reflectance.environment import band_factors, lit_by, panorama_directions
-from cdrf_addon.core.reflectance.model import PROFILE, RING, profile, ring, sphere
+from cdrf_addon.core.reflectance.model import PROFILE, RING, ring, sphere
+from cdrf_addon.core.reflectance.profile import profile
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ class Extreme:
 SIGMA, MESHES, KAPPA = "σ: widths of the blur", "Meshes", "κ: curvature"
 LIGHTS, UNITS, TABLES = "Lights and worlds", "Units and sizes", "Tables and measurements"
 CLOSED = "the closed forms change over to a series; arguments are checked at the door"
-CLEAN = "core/mesh.py welds, filters, orients and normalises before any estimate"
+CLEAN = "core/curvature/clean.py welds, filters, orients and normalises before any estimate"
 NODES = "nodes clamp what they divide by and what they look up"
 
 EXTREMES = (
@@ -87,7 +87,8 @@ EXTREMES = (
     Extreme(KAPPA, "core/test_field.py::test_moving_does_not_matter",
             "meshes up to 10⁶ units from their origin", "the same κ", CLEAN),
     Extreme(KAPPA, "core/test_field.py::test_other_radii_are_refused_in_a_sentence",
-            "0, −1, 10⁹, NaN and ∞ rings", "a sentence", "core/curvature.py checks its options"),
+            "0, −1, 10⁹, NaN and ∞ rings", "a sentence",
+            "core/curvature/field.py checks its options"),
     Extreme(KAPPA, "core/test_diffusion.py::test_needles_and_specks_stay_finite",
             "heat steps of 10⁻³ to 30 on needles and on a speck far away", "finite",
             "needles are softened, overshoots cut to the field's range"),
@@ -126,10 +127,12 @@ EXTREMES = (
             "every light type and setting at σ₀ = 0", "EEVEE's Diffuse BSDF",
             "the radiometry of decision 3"),
     Extreme(LIGHTS, "core/test_finite_light.py::test_the_blur_stands_for_the_light",
-            "lights up to half-angles of 46°", "within the stated error", "core/finite_light.py"),
-    Extreme(LIGHTS, "core/test_environment.py::test_senseless_pixels_are_black_and_shapes_are_checked",
+            "lights up to half-angles of 46°", "within the stated error",
+            "core/reflectance/finite_light.py"),
+    Extreme(LIGHTS,
+            "core/test_environment.py::test_senseless_pixels_are_black_and_shapes_are_checked",
             "worlds with pixels of NaN, ∞ and negative radiance", "black there",
-            "core/ambient.py clips"),
+            "core/reflectance/environment.py clips"),
     Extreme(LIGHTS, "core/test_environment.py::test_extremes_of_sigma",
             "a world's light at σ of 0 and ∞", "Lambert's, and its mean", "closed band factors"),
     Extreme(LIGHTS, "render/test_ambient.py::test_no_node_for_a_black_or_missing_world",
@@ -144,15 +147,17 @@ EXTREMES = (
             "objects scaled by 2, 0.01 and −1", "κ in world units", "κ is measured at world size"),
     Extreme(UNITS, "blender/test_setup.py::test_small_values_reach_the_shader_unsnapped",
             "tiny σ₀ and κ", "not rounded to 0", "sockets without a least value"),
-    Extreme(UNITS, "core/test_presets.py::test_impossible_media_are_refused_in_a_sentence",
-            "scattering coefficients of 0, −1, NaN, ∞", "a sentence", "core/dipole.py"),
+    Extreme(UNITS, "core/test_dipole.py::test_impossible_media_are_refused_in_a_sentence",
+            "scattering coefficients of 0, −1, NaN, ∞", "a sentence", "core/scattering/dipole.py"),
     Extreme(TABLES, "core/test_measured_model.py::test_finite_and_never_negative",
             "measured tables at every σ, 0 and ∞ included", "finite, never negative",
             "rows end where nothing changes any more"),
-    Extreme(TABLES, "core/test_measured_model.py::test_foreign_and_broken_files_are_refused",
-            "damaged and foreign files", "a sentence, and measured again", "core/measurement.py"),
-    Extreme(TABLES, "core/test_measured_model.py::test_impossible_measurements_are_refused",
-            "measurements that hold NaN or impossible values", "a sentence", "core/measurement.py"),
+    Extreme(TABLES, "core/test_measurement.py::test_foreign_and_broken_files_are_refused",
+            "damaged and foreign files", "a sentence, and measured again",
+            "core/measured/measurement.py"),
+    Extreme(TABLES, "core/test_measurement.py::test_impossible_measurements_are_refused",
+            "measurements that hold NaN or impossible values", "a sentence",
+            "core/measured/measurement.py"),
     Extreme(TABLES, "blender/test_measuring.py::test_a_deleted_measured_table_is_said",
             "a measured table deleted from the file", "the sphere model, and a sentence",
             "the default stands in"),

@@ -23,14 +23,12 @@ from ...core.reflectance.model import (
     MEASURED,
     PROFILE,
     RING,
-    SKIN_PROFILE,
     SPHERE,
     Model,
-    parse_profile,
-    profile,
     ring,
     sphere,
 )
+from ...core.reflectance.profile import SKIN_PROFILE, parse_profile, profile
 from ...core.scattering.node_radius import sigma0_per_radius
 from ...core.scattering.presets import Preset, in_units
 from ..nodes.tables import ensure_table, find_table, table_of
