@@ -31,7 +31,8 @@ from cdrf_addon.blender.nodes.reflectance import (  # noqa: E402
     reflectance_group,
 )
 from cdrf_addon.blender.nodes.tables import ensure_table  # noqa: E402
-from cdrf_addon.core.reflectance.models import name_of, profile, ring, sphere  # noqa: E402
+from cdrf_addon.core.reflectance.model import name_of, ring, sphere  # noqa: E402
+from cdrf_addon.core.reflectance.profile import profile  # noqa: E402
 
 ASSET_FILE = HERE / "cdrf.blend"
 TOPOLOGY_FILE = HERE / "topology.txt"

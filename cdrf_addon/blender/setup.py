@@ -20,7 +20,7 @@ from ..compat import EEVEE
 from ..core.curvature.facets import is_faceted
 from ..core.curvature.field import DEFAULT_OPTIONS, CleanCurvature, Options, curvature_steps
 from ..core.curvature.scale_space import LEVELS, level_steps
-from ..core.curvature.spherical import sphere_curvature
+from ..core.curvature.spherical import curvature_if_spherical
 from ..core.curvature.summary import (
     CONSTANT,
     FLAT,
@@ -421,7 +421,7 @@ class Setup:
             work.summary = FLAT_SUMMARY
             return np.zeros((len(shape.mesh.vertices), 4 + LEVELS + 2), dtype=np.float32)
         cleaned: CleanCurvature | None = None
-        found = sphere_curvature(shape.mesh)
+        found = curvature_if_spherical(shape.mesh)
         if found is None:
             cleaned = yield from portion(curvature_steps(shape.mesh, work.options), 0.0, 0.75)
             found = cleaned.on_source()
@@ -432,7 +432,7 @@ class Setup:
         finest = np.ones_like(found.kappa)
         if cleaned is not None and work.summary.kind == VARYING:
             diffused = yield from portion(level_steps(cleaned), 0.75, 1.0)
-            levels, finest = diffused.values, diffused.finest
+            levels, finest = diffused.values, diffused.shortest
         limit = np.finfo(np.float32).max
         values = np.column_stack((principal, levels, finest, found.filled))
         return np.clip(values, -limit, limit).astype(np.float32)

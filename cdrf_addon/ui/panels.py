@@ -20,7 +20,7 @@ from ..blender.world.surface import FIXED, SCALED
 from ..compat import EEVEE, HAS_RAYCAST
 from ..core.curvature.estimators import METHODS
 from ..core.curvature.summary import CONSTANT, FLAT, VARYING
-from ..core.reflectance.models import MODEL_ITEMS, PROFILE
+from ..core.reflectance.model import MODEL_ITEMS, PROFILE
 
 _MOST_LINES = 6
 

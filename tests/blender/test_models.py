@@ -14,14 +14,8 @@ from cdrf_addon import ids
 from cdrf_addon.blender.material.scattering import read_scattering
 from cdrf_addon.blender.nodes.tables import ensure_table, find_table
 from cdrf_addon.compat import ensure_node_tree, walk_method
-from cdrf_addon.core.reflectance.models import (
-    PROFILE,
-    RING,
-    SKIN_PROFILE,
-    SPHERE,
-    parse_profile,
-    ring,
-)
+from cdrf_addon.core.reflectance.model import PROFILE, RING, SPHERE, ring
+from cdrf_addon.core.reflectance.profile import SKIN_PROFILE, parse_profile
 from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
 from cdrf_addon.core.scattering.presets import PRESETS
 

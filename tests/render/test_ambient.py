@@ -19,7 +19,8 @@ from cdrf_addon.blender.world.stamps import stamped
 from cdrf_addon.blender.world.surface import is_animated
 from cdrf_addon.core.errors import SceneError
 from cdrf_addon.core.reflectance.environment import band_factors, lit_by, panorama_directions
-from cdrf_addon.core.reflectance.models import PROFILE, RING, profile, ring, sphere
+from cdrf_addon.core.reflectance.model import PROFILE, RING, ring, sphere
+from cdrf_addon.core.reflectance.profile import profile
 
 
 @pytest.fixture

@@ -37,7 +37,7 @@ def egg(rig: Rig) -> bpy.types.Object:
 def store(mesh: bpy.types.Mesh, levels: KappaLevels) -> None:
     attribute = mesh.attributes[ids.DIFFUSED_ATTRIBUTE]
     attribute.data.foreach_set("color", np.tile(levels.values[0], len(mesh.vertices)))
-    lengths = np.full(len(mesh.vertices), levels.finest[0], dtype=np.float32)
+    lengths = np.full(len(mesh.vertices), levels.shortest[0], dtype=np.float32)
     mesh.attributes[ids.LENGTH_ATTRIBUTE].data.foreach_set("value", lengths)
     mesh.update_tag()
 
@@ -46,7 +46,7 @@ def store(mesh: bpy.types.Mesh, levels: KappaLevels) -> None:
 def test_each_channel_takes_kappa_at_its_own_length(rig: Rig) -> None:
     sun = rig.light("SUN", energy=math.pi, angle=0.0, rotation=FROM_THE_SIDE)
     obj = egg(rig)
-    levels = KappaLevels(np.array([KAPPAS]), finest=np.array([0.02]))
+    levels = KappaLevels(np.array([KAPPAS]), shortest=np.array([0.02]))
     store(obj.data, levels)
     material = obj.data.materials[0]
     ratio = (1.0, 0.3, 0.05)
@@ -77,7 +77,7 @@ def test_an_object_twice_as_large_scatters_like_the_measured_one_at_half_the_dis
     rig.scene.collection.objects.link(other)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     material = obj.data.materials[0]
-    levels = KappaLevels(np.array([KAPPAS]), finest=np.array([0.02]))
+    levels = KappaLevels(np.array([KAPPAS]), shortest=np.array([0.02]))
     store(obj.data, levels)
     bpy.context.view_layer.update()
     towards = np.array(sun.matrix_world)[:3, 2]

@@ -18,19 +18,17 @@ from ... import ids
 from ...compat import animation_curves, walk_method
 from ...core.errors import ParameterError, SceneError
 from ...core.reflectance.detail import DETAIL_PER_SIGMA0
-from ...core.reflectance.models import (
+from ...core.reflectance.model import (
     DEFAULT_KIND,
     MEASURED,
     PROFILE,
     RING,
-    SKIN_PROFILE,
     SPHERE,
     Model,
-    parse_profile,
-    profile,
     ring,
     sphere,
 )
+from ...core.reflectance.profile import SKIN_PROFILE, parse_profile, profile
 from ...core.scattering.node_radius import sigma0_per_radius
 from ...core.scattering.presets import Preset, in_units
 from ..nodes.tables import ensure_table, find_table, table_of

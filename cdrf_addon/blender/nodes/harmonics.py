@@ -18,7 +18,7 @@ import numpy as np
 from ... import ids
 from ...core.reflectance.environment import BAND_ROWS
 from ...core.reflectance.lut import VARIANCE_MAX
-from ...core.reflectance.models import SPHERE, name_of
+from ...core.reflectance.model import SPHERE, name_of
 from .reflectance import SEPARATE
 from .tables import Table, bands_image
 from .tree import Operand, Socket, Sockets, TreeBuilder, declare, ensure_group

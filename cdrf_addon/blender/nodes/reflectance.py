@@ -16,7 +16,7 @@ import bpy
 
 from ... import ids
 from ...core.reflectance.lut import DEFAULT_LAYOUT, VARIANCE_MAX
-from ...core.reflectance.models import name_of
+from ...core.reflectance.model import name_of
 from .tables import Table
 from .tree import Operand, Socket, TreeBuilder, declare, ensure_group
 

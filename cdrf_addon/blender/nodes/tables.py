@@ -16,7 +16,7 @@ from ... import ids
 from ...core.errors import SceneError
 from ...core.reflectance.environment import bands_of_table
 from ...core.reflectance.lut import DEFAULT_LAYOUT, build_lut
-from ...core.reflectance.models import RING, SPHERE, Model, name_of, ring, sphere
+from ...core.reflectance.model import RING, SPHERE, Model, name_of, ring, sphere
 
 LUT_VERSION = 5
 

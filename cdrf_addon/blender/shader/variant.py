@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import bpy
 
 from ... import ids
-from ...core.reflectance.models import RING, name_of
+from ...core.reflectance.model import RING, name_of
 
 FLAT, CONSTANT, ATTRIBUTE, SCALED = "flat", "constant", "attribute", "scaled attribute"
 """Source of kappa: none, the Curvature input, the mesh, the mesh and the object's size."""

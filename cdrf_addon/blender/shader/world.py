@@ -18,7 +18,7 @@ import bpy
 
 from ... import ids
 from ...core.reflectance.environment import Sun, shader_coefficients
-from ...core.reflectance.models import SPHERE
+from ...core.reflectance.model import SPHERE
 from ..lights.drivers import drive
 from ..lights.scene_lights import HARD_SUN, SceneLight
 from ..nodes.harmonics import bands_group, harmonics_group
