@@ -62,7 +62,7 @@ from .shader import variant
 from .shader.bits import MOST_SELECTIVE
 from .shader.group import ensure_shader_group
 from .world.light import WorldLight, world_light
-from .world.surface import is_animated, scene_world
+from .world.surface import is_world_animated, scene_world
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -327,7 +327,7 @@ class Setup:
             self.world = world_light(found, again=self.recompute)
         except CdrfError as error:
             self.report.warnings.append(str(error))
-        if found is not None and self.world is not None and is_animated(found):
+        if found is not None and self.world is not None and is_world_animated(found):
             self.report.warnings.append(
                 f"The world '{found.name}' is animated: its strength is followed, the rest is that "
                 f"of frame {self.scene.frame_current}."

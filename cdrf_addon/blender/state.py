@@ -23,8 +23,8 @@ from .shader.bits import bits_due
 from .shader.due import is_current, layers_due, shadows_due
 from .shader.variant import ATTRIBUTE, SCALED, stamped_variant, variant_of
 from .shader.wired import wanted_light, wired_lights
-from .world.light import clear_captured
-from .world.stamps import is_due
+from .world.light import clear_captured_worlds
+from .world.stamps import is_world_due
 from .world.surface import scene_world
 
 _touched: set[int] = set()
@@ -44,7 +44,7 @@ def note_touched(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
 @bpy.app.handlers.persistent
 def forget_worlds(*_args: object) -> None:
     """Handler: another file was loaded."""
-    clear_captured()
+    clear_captured_worlds()
 
 
 @bpy.app.handlers.persistent
@@ -151,7 +151,7 @@ def reasons_to_update(
             reasons.append(f"Lights: {due}.")
         elif linking.unlit_is_due(item):
             reasons.append(f"Lights: '{item.name}' receives others now.")
-        if not playing and is_due(group, scene_world(scene, view_layer)):
+        if not playing and is_world_due(group, scene_world(scene, view_layer)):
             reasons.append("The world's light was changed.")
         variant = stamped_variant(group)
         if node.inputs[ids.NORMAL].is_linked != variant.mapped:

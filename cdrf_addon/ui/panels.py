@@ -15,7 +15,7 @@ from ..blender.material import model as reflectance_models
 from ..blender.material import specular as gloss
 from ..blender.shader.variant import stamped_variant
 from ..blender.shader.wired import wired_lights
-from ..blender.world.stamps import stamped
+from ..blender.world.stamps import stamped_world
 from ..blender.world.surface import FIXED, SCALED
 from ..compat import EEVEE, HAS_RAYCAST
 from ..core.curvature.estimators import METHODS
@@ -94,7 +94,7 @@ def draw_ambient(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
     """Draw what of the world's light reaches the material, and its occlusion."""
     node = materials.cdrf_node(skin)
     assert node is not None
-    light = stamped(node.node_tree)
+    light = stamped_world(node.node_tree)
     if light is None:
         layout.label(text="No light from the world", icon="WORLD")
         return

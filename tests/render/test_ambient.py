@@ -15,8 +15,8 @@ from tolerances import WORLD_CYCLES, WRITTEN
 from cdrf_addon import compat, ids
 from cdrf_addon.blender import state
 from cdrf_addon.blender.world.capture import capture
-from cdrf_addon.blender.world.stamps import stamped
-from cdrf_addon.blender.world.surface import is_animated
+from cdrf_addon.blender.world.stamps import stamped_world
+from cdrf_addon.blender.world.surface import is_world_animated
 from cdrf_addon.core.errors import SceneError
 from cdrf_addon.core.reflectance.environment import band_factors, lit_by, panorama_directions
 from cdrf_addon.core.reflectance.model import PROFILE, RING, ring, sphere
@@ -90,7 +90,7 @@ def test_white_world_is_one_and_followed(rig: Rig) -> None:
 def test_no_node_for_a_black_or_missing_world(rig: Rig) -> None:
     ball = white(rig)
     group = cdrf_node(ball).node_tree
-    assert ids.WORLD_NODE not in group.nodes and stamped(group) is None
+    assert ids.WORLD_NODE not in group.nodes and stamped_world(group) is None
     assert due(rig, ball) == []
     plain(rig)
     assert any("world" in line for line in due(rig, ball))
@@ -108,7 +108,7 @@ def test_gradient_sky_is_filtered_by_every_model(rig: Rig) -> None:
     picture(rig, 0.5 + 0.3 * z * np.array([1.0, 0.5, -1.0]) + 0.05 * (3.0 * z**2 - 1.0))
     ball = white(rig)
     material = ball.data.materials[0]
-    light = stamped(cdrf_node(ball).node_tree)
+    light = stamped_world(cdrf_node(ball).node_tree)
     assert light is not None and light.environment.sun is None
     normals, covered = rig.normals(ball)
     material.cdrf.sigma0_ratio = (1.0, 0.5, 0.1)
@@ -152,7 +152,7 @@ def test_against_cycles_and_the_diffuse_bsdf(rig: Rig, sky) -> None:
     picture(rig, sky())
     ball = white(rig)
     ball.data.materials[0].cdrf.sigma0 = 0.0
-    light = stamped(cdrf_node(ball).node_tree)
+    light = stamped_world(cdrf_node(ball).node_tree)
     assert light is not None and light.environment.sun is not None
     ours = rig.render()
     ball.data.materials[0] = diffuse_material()
@@ -217,7 +217,7 @@ def test_without_cycles_the_lights_still_work(rig: Rig, monkeypatch, capfd) -> N
 
     monkeypatch.setattr("cdrf_addon.blender.world.light.capture", refuse)
     ball = white(rig)
-    assert stamped(cdrf_node(ball).node_tree) is None
+    assert stamped_world(cdrf_node(ball).node_tree) is None
     assert "Sun" in cdrf_node(ball).node_tree.nodes
     assert any("world" in line for line in due(rig, ball))
     assert "enable" in capfd.readouterr().out
@@ -228,7 +228,7 @@ def test_a_saved_file_knows_its_world(rig: Rig, tmp_path, monkeypatch) -> None:
     rig.scene.world.node_tree.nodes["HDRI"].image.pack()
     ball = white(rig)
     name = ball.name
-    before = stamped(cdrf_node(ball).node_tree)
+    before = stamped_world(cdrf_node(ball).node_tree)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "world.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "world.blend"))
     ball = bpy.data.objects[name]
@@ -240,7 +240,7 @@ def test_a_saved_file_knows_its_world(rig: Rig, tmp_path, monkeypatch) -> None:
 
     monkeypatch.setattr("cdrf_addon.blender.world.light.capture", refuse)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    after = stamped(cdrf_node(ball).node_tree)
+    after = stamped_world(cdrf_node(ball).node_tree)
     assert before is not None and after is not None
     assert np.array_equal(before.environment.harmonics, after.environment.harmonics)
     assert after.world == scene.world
@@ -254,7 +254,7 @@ def test_a_flat_mesh_is_lit_by_a_pictures_sun_alone(rig: Rig) -> None:
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
     node = cdrf_node(plane)
     node.inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
-    light = stamped(node.node_tree)
+    light = stamped_world(node.node_tree)
     assert light is not None and light.environment.sun is not None
     sun = light.environment.sun
     # Turned halfway from the sun to the camera, so that both see it.
@@ -280,7 +280,7 @@ def test_the_camera_may_see_another_world(rig: Rig) -> None:
     tree.links.new(mix.outputs[2], background(rig).inputs["Color"])
     background(rig).inputs["Strength"].default_value = 1.0
     ball = white(rig)
-    light = stamped(cdrf_node(ball).node_tree)
+    light = stamped_world(cdrf_node(ball).node_tree)
     assert light is not None
     white_in = lit_by(light.environment.harmonics, (0.0, 0.0, 1.0), np.ones((3, 3)))
     assert white_in == pytest.approx((0.5,) * 3, rel=1e-3)
@@ -342,14 +342,14 @@ def test_a_turned_picture_is_followed(rig: Rig, kind: str) -> None:
     turn.inputs["Rotation"].default_value = (0.1, 0.2, 0.3)
     ball = white(rig)
     ball.data.materials[0].cdrf.sigma0 = 0.2
-    light = stamped(cdrf_node(ball).node_tree)
+    light = stamped_world(cdrf_node(ball).node_tree)
     assert light is not None and light.mapping == turn.name and light.environment.sun is not None
     for frame, angles in ((1, (0.0, 0.0, 0.0)), (3, (0.8, -1.4, 4.4))):
         turn.inputs["Rotation"].default_value = angles
         turn.inputs["Rotation"].keyframe_insert("default_value", frame=frame)
     rig.scene.frame_set(2)
     assert turn.inputs["Rotation"].default_value[2] == pytest.approx(2.2)
-    assert due(rig, ball) == [] and not is_animated(rig.scene.world)
+    assert due(rig, ball) == [] and not is_world_animated(rig.scene.world)
     group = cdrf_node(ball).node_tree
     assert all(curve.driver.is_simple_expression for curve in group.animation_data.drivers)
     followed = rig.render()
@@ -361,7 +361,7 @@ def test_a_turned_picture_is_followed(rig: Rig, kind: str) -> None:
     tree.links.new(same.outputs["Vector"], tree.nodes["HDRI"].inputs["Vector"])
     assert any("world" in line for line in due(rig, ball))
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    light = stamped(cdrf_node(ball).node_tree)
+    light = stamped_world(cdrf_node(ball).node_tree)
     assert light is not None and not light.mapping
     assert "ShaderNodeMapping" not in kinds(ball)
     fresh = rig.render()

@@ -14,7 +14,7 @@ from rig import Rig, cdrf_node, diffuse_material
 AIM = {"location": (1.5, -3.0, 2.0), "rotation": (math.radians(59.2), 0.0, math.radians(26.6))}
 SIDE = (math.radians(50.0), 0.0, math.radians(70.0))
 # A light, and the worst and RMS error in parts of the peak: measured, rounded up by a third or
-# less. Most of the RMS is the Gaussian that stands for the light; see core/finite_light.py.
+# less. Most of the RMS is that of the Gaussian in the light's place: core/reflectance/finite_light.
 LIGHTS: dict[str, tuple[str, dict[str, Any], float, float]] = {
     "sun of 20 degrees": ("SUN", {"angle": math.radians(20.0), "rotation": SIDE}, 0.003, 0.0008),
     "sun of 60 degrees": ("SUN", {"angle": math.radians(60.0), "rotation": SIDE}, 0.01, 0.0043),

@@ -231,7 +231,7 @@ def test_gloss_is_offered_where_there_is_some(rig: Rig) -> None:
 def test_without_scattering_it_is_the_principled_bsdf(rig: Rig, settings) -> None:
     """Base colour 0.8, 0.5, 0.3 under a sun: the whole against Blender's own, in parts of the peak.
 
-    The bound is what the fit of the gloss's albedo leaves, at rims most (core/gloss.py).
+    The bound is what the fit of the specular albedo (core/reflectance/specular.py) leaves at rims.
     """
     rig.scene.render.resolution_x = rig.scene.render.resolution_y = 64
     rig.light("SUN", energy=math.pi, rotation=(math.radians(60.0), 0.0, math.radians(30.0)))

@@ -241,7 +241,7 @@ def test_a_linked_character_is_lit_by_this_file(rig: Rig, tmp_path: Path) -> Non
 
 
 @pytest.mark.smoke
-def test_linking_of_a_skin_in_an_instance_is_that_of_the_empty(rig: Rig) -> None:
+def test_light_linking_of_an_instance_is_that_of_the_empty(rig: Rig) -> None:
     first, second = sun(rig, "Key"), sun(rig, "Rim")
     ball = white_ball(rig, x=-0.75)
     chars = bpy.data.collections.new("Chars")
@@ -293,7 +293,7 @@ def test_shadows_do_not_depend_on_which_view_layer_is_open(rig: Rig) -> None:
     assert not choose_shadows(material, bare).cast
 
 
-def test_a_renamed_scene_keeps_its_skins(rig: Rig) -> None:
+def test_a_renamed_scene_keeps_its_materials(rig: Rig) -> None:
     sun(rig, "Key")
     ball = white_ball(rig)
     material = ball.data.materials[0]
@@ -307,7 +307,7 @@ def test_a_renamed_scene_keeps_its_skins(rig: Rig) -> None:
     bpy.data.scenes.remove(other)
 
 
-def test_a_light_in_very_many_excluded_collections_is_told_of(rig: Rig) -> None:
+def test_a_light_in_very_many_excluded_collections_is_reported(rig: Rig) -> None:
     lamp = sun(rig, "Key")
     rig.sphere(RADIUS)
     for number in range(60):

@@ -40,7 +40,7 @@ from ..shader.variant import (
     stamped_variant,
     variant_of,
 )
-from ..world.stamps import stamped
+from ..world.stamps import stamped_world
 from . import linking
 from .install import cdrf_node, install, require_editable
 from .scattering import Scattering
@@ -304,7 +304,7 @@ def _install(
     lights = linking.material_lights(material, scene, layer)
     wanted = replace(wanted, links=linking.links_of(lights))
     # The world's light as it was at the last Update: a slider must not render anything.
-    light = stamped(group)
+    light = stamped_world(group)
     install(material, ensure_shader_group(wanted, scene, lights, light))
     linking.write_unlit()
 

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The node groups of the lights: one for each type, driven and wired elsewhere.
 
-Each turns what Blender stores of a lamp into
+Each turns what Blender stores of a lamp into three outputs, with EEVEE's own constants and limits
+(decision 003):
 
     Direction  unit vector from the surface to the light
     Radiance   what a white Lambert surface facing the light would send out, per channel
     Variance   blur of the terminator by the light's size, rad^2 (core/reflectance/finite_light.py)
-
-With EEVEE's own constants and limits (decision 003).
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from ...core.reflectance.finite_light import SPHERE_GAIN, VARIANCE_COEFFICIENTS
 from .tree import Operand, Socket, TreeBuilder, declare, ensure_group
 
 VERSION = 9
-
 
 ELLIPTIC = {"DISK", "ELLIPSE"}
 """Shapes of an area light that are not rectangles."""

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The wiring of a shader group: the sum over its lights of paper Eq. 5, and nothing it lacks.
 
-attribute levels -> kappa at the channel's length (curvature.py)   |
-                 -> x Sigma0 x Ratio -> squared = variance ---------+
-normal (or map) -------+                                           |
-light i -> Direction --+-> dot -> Cosine --------> Reflectance <---+-- + light's Variance/moment
-        -> Radiance (x received, x visibility) --> x f --> sum over i (lights.py) --+
-world (world.py) -------------------------------------------------------------------+-> +
-    -> x Base Color -> Emission (Strength) -> Shader
+Wiring:
+
+    levels -> kappa at the channel's length -> x Sigma0 x Ratio -> squared (curvature.py) --+
+    light i -> Variance -> / moment of the channel (surface.py) ----------------------------+-> + -+
+    light i -> Direction -+-> dot -> Cosine -----------------------> Reflectance f <---------------+
+    normal (or map) ------+                                                |
+    light i -> Radiance -> x received -> x visibility (visibility.py) -> x f -> sum over i --+
+    world (world.py) ------------------------------------------------------------------------+-> +
+        -> x Base Color -> Emission (Strength) -> Shader
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ from .visibility import thickness
 from .world import add_world, filters_world
 
 VERSION = 11
-"""Of the wiring. Raise it with every change, so that older files are rebuilt at the next Update."""
+"""Raise it with every change of the wiring: Update rebuilds the groups of older files."""
 
 
 def build(

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether a shader group still has the lights of its scene, and which of them differs.
 
-lights of the scene --+-> wanted --+
-variant of the group -+            +-> equal: current; else a sentence for the panel
-nodes, drivers of the group -> wired
+What is compared:
+
+    lights of the scene --+-> wanted ----------+
+    variant of the group -+                    +-> equal: current; else a sentence for the panel
+    nodes and drivers of the group -> wired ---+
 """
 
 from __future__ import annotations

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The shader groups of a scene: found, made, and rebuilt when their lights or world change.
 
-(variant, scene) -> stamps -> found? -- no --> new, stamped --+
-                                |                             +-> build -> stamped, returned
-                                yes -> current? -- no --------+
-                                          yes -> returned as it is
+The steps:
+
+    variant, scene -> found by its stamps? --- no ---> new, stamped ---+
+                              |                                        +-> build -> stamped
+                             yes ---> current? --- no -----------------+
+                                         |
+                                        yes ---> returned as it is
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from ..lights.scene_lights import SceneLight
 from ..nodes.tables import table_of
 from ..nodes.tree import rebuild
 from ..world.light import WorldLight
-from ..world.stamps import is_same, stamp, stamped
+from ..world.stamps import is_same_light, stamp_world, stamped_world
 from ..world.surface import world_shines
 from .build import VERSION, build
 from .due import is_current
@@ -49,11 +52,11 @@ def ensure_shader_group(
         group[ids.SCENE_KEY] = scene.name
         group.color_tag = "SHADER"
         group.description = "Curvature-dependent translucency (Kubo et al. 2011), made by CDRF"
-    elif is_current(group, lights) and is_same(stamped(group), world):
+    elif is_current(group, lights) and is_same_light(stamped_world(group), world):
         return group
     table = table_of(variant.model)
     rebuild(group, lambda builder: build(builder, variant, lights, world, table))
-    stamp(group, world)
+    stamp_world(group, world)
     group[ids.SHADOW_WORLD_KEY] = world_shines(scene.world)
     group[ids.VERSION_KEY] = VERSION
     return group

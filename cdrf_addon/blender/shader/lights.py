@@ -3,10 +3,11 @@
 
 Wiring, for each light:
 
-    drivers -> light's group -> Direction, Variance --> Reflectance -------------------+
-                             -> Radiance -> x received (bits.py) -> x visibility (rgb) -+-> + total
+    drivers -> light's group -> Direction, Variance -> Reflectance f -------+
+                             -> Radiance -> x received -> x visibility ------+-> x f -> + total
 
-The visibility, where shadows are wired, is one number, or with coloured edges one per channel.
+Bits of the object decide what is received (bits.py), shadow maps what is visible (visibility.py):
+one number, or with coloured edges one per channel.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
 
 Wiring:
 
-    geometry's normal -----------------------------------------+
-    Normal input (a map) - own -> x weight left at its sigma0 -+-> normalised -> normal
-    normal . Direction -> Cosine -------------------------------+
-    sigma^2 + light's Variance / moment of the channel ---------+-> Reflectance
+    geometry's normal ---------------------------------------------------+
+    map - geometry's normal -> x weight that detail keeps at its sigma0 --+-> + -> normal
+    normal . light's Direction -> Cosine ------------------+
+    sigma^2 + light's Variance / moment of the channel ----+-> Reflectance
 """
 
 from __future__ import annotations

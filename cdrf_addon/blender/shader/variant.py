@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What decides the content of a shader group apart from its lights and world, and its name.
 
-ratio -> channels (RGB, R GB, ...) --+
-mesh -> source of kappa -------------+-> Variant -> stamped on the group, read back from it
-material -> model, shadows, ... -----+
+From material to group and back:
+
+    ratio -> channels (RGB, R GB, ...) --+
+    mesh -> source of kappa -------------+-> Variant -> stamped on the group -> read back
+    material -> model, shadows, ... -----+
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The world's light in a shader group: its harmonics, its sun, and what follows the world.
 
-Wiring, only as far as a world has it (a plain one is one node, or two under a filtering model):
+Wiring, only as far as a world has it (a plain one is one node, or two where the model filters it):
 
-    Variance -> Bands ------------------------------+
-    normal -> turned by the world's Mapping node ---+-> Harmonics ----------+
-    the sun's direction, turned back -> Sun -> Reflectance x Radiance ------+-> + -> x occlusion
-                                                                -> x World (drivers) -> + total
+    Variance -> Bands -----------------------------+
+    normal -> turned by the world's Mapping node --+-> Harmonics --------+
+    the sun's direction, turned back -> Sun -> Reflectance x Radiance ---+-> +
+        -> x Ambient Occlusion -> x World (drivers) -> + sum over the lights
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import bpy
 
-from .surface import FIXED, SCALED, is_moved, read_surface
+from .surface import FIXED, SCALED, is_socket_animated, read_surface
 
 VERSION = 1
 BLACK = ""
@@ -62,7 +62,9 @@ def _describe_tree(
         for socket in node.inputs:
             if not socket.is_linked and hasattr(socket, "default_value") and socket not in driven:
                 # A keyframed value would be another at every frame.
-                value = "animated" if is_moved(tree, socket) else _plain(socket.default_value)
+                value = (
+                    "animated" if is_socket_animated(tree, socket) else _plain(socket.default_value)
+                )
                 parts.append(value)
     parts += [
         [link.from_node.name, link.from_socket.identifier, link.to_node.name,

@@ -94,7 +94,7 @@ def from_text(text: str, fingerprint: str, world: bpy.types.World | None) -> Wor
     )
 
 
-def clear_captured() -> None:
+def clear_captured_worlds() -> None:
     """Clear the captured worlds: another file may have pictures of the same names."""
     _captured.clear()
 

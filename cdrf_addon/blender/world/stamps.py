@@ -10,7 +10,7 @@ from .fingerprint import BLACK, fingerprint
 from .light import WorldLight, from_text
 
 
-def stamp(group: bpy.types.ShaderNodeTree, light: WorldLight | None) -> None:
+def stamp_world(group: bpy.types.ShaderNodeTree, light: WorldLight | None) -> None:
     """Note on a shader group which world's light it has."""
     for key in (ids.WORLD_KEY, ids.WORLD_LIGHT_KEY, ids.WORLD_DATA_KEY):
         if key in group:
@@ -22,7 +22,7 @@ def stamp(group: bpy.types.ShaderNodeTree, light: WorldLight | None) -> None:
             group[ids.WORLD_DATA_KEY] = light.world
 
 
-def stamped(group: bpy.types.ShaderNodeTree) -> WorldLight | None:
+def stamped_world(group: bpy.types.ShaderNodeTree) -> WorldLight | None:
     """Return the world's light that a shader group has; None for no light."""
     name = group.get(ids.WORLD_KEY, BLACK)
     if name == BLACK or ids.WORLD_LIGHT_KEY not in group:
@@ -30,7 +30,7 @@ def stamped(group: bpy.types.ShaderNodeTree) -> WorldLight | None:
     return from_text(group[ids.WORLD_LIGHT_KEY], name, group.get(ids.WORLD_DATA_KEY))
 
 
-def is_same(one: WorldLight | None, other: WorldLight | None) -> bool:
+def is_same_light(one: WorldLight | None, other: WorldLight | None) -> bool:
     """Return whether two lights are wired alike."""
     if one is None or other is None:
         return one is other
@@ -38,7 +38,7 @@ def is_same(one: WorldLight | None, other: WorldLight | None) -> bool:
     return same and one.to_text() == other.to_text()
 
 
-def is_due(group: bpy.types.ShaderNodeTree, world: bpy.types.World | None) -> bool:
+def is_world_due(group: bpy.types.ShaderNodeTree, world: bpy.types.World | None) -> bool:
     """Return whether a shader group has another light than this world's."""
     name = fingerprint(world)
     if group.get(ids.WORLD_KEY, BLACK) != name:

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the surface of a world is made of, as far as drivers can follow it.
 
-colour    without nodes: the world's colour
-plain     Background with a colour and a strength of its own
-scaled    Background with a linked colour; its strength follows, and so does the rotation in
-          Texture Coordinate (Generated) -> Mapping -> Environment Texture -> Background
-fixed     anything else: nothing follows
+Its kinds:
+
+    colour    without nodes: drivers follow the world's colour
+    plain     Background with values for colour and strength: drivers follow both
+    scaled    Background with a linked colour: drivers follow its strength, and the rotation in
+              Texture Coordinate (Generated) -> Mapping -> Environment Texture -> Background
+    fixed     anything else: drivers follow nothing
 """
 
 from __future__ import annotations
@@ -58,10 +60,10 @@ def read_surface(world: bpy.types.World) -> WorldSurface:
     if node.type != "BACKGROUND" or node.mute or node.inputs["Strength"].is_linked:
         return WorldSurface(FIXED, None, False)
     strength, colour = node.inputs["Strength"], node.inputs["Color"]
-    dark = not (strength.default_value > 0.0 or is_moved(tree, strength))
+    dark = not (strength.default_value > 0.0 or is_socket_animated(tree, strength))
     if colour.is_linked:
         return WorldSurface(SCALED, node, dark, _mapping(tree, colour))
-    dark = dark or not (max(colour.default_value[:3]) > 0.0 or is_moved(tree, colour))
+    dark = dark or not (max(colour.default_value[:3]) > 0.0 or is_socket_animated(tree, colour))
     return WorldSurface(PLAIN, node, dark)
 
 
@@ -98,7 +100,7 @@ def _mapping(
             continue
         if (
             given.is_linked
-            or is_moved(tree, given)
+            or is_socket_animated(tree, given)
             or any(v != neutral for v in given.default_value)
         ):
             return None
@@ -109,12 +111,12 @@ def _animates(world: bpy.types.World, path: str) -> bool:
     return bool(animation_curves(world, path))
 
 
-def is_moved(tree: bpy.types.ShaderNodeTree, socket: bpy.types.NodeSocket) -> bool:
+def is_socket_animated(tree: bpy.types.ShaderNodeTree, socket: bpy.types.NodeSocket) -> bool:
     """Return whether the value of an input is animated."""
     return bool(animation_curves(tree, socket.path_from_id("default_value")))
 
 
-def is_animated(world: bpy.types.World) -> bool:
+def is_world_animated(world: bpy.types.World) -> bool:
     """Return whether the world is animated in a way that drivers do not follow."""
     surface = read_surface(world)
     if surface.kind in {COLOUR, PLAIN}:
@@ -122,7 +124,7 @@ def is_animated(world: bpy.types.World) -> bool:
     tree = world.node_tree
     driven = surface.driven()
     return any(
-        is_moved(tree, socket)
+        is_socket_animated(tree, socket)
         for node in tree.nodes
         for socket in node.inputs
         if hasattr(socket, "default_value") and not socket.is_linked and socket not in driven
