@@ -101,12 +101,24 @@ class Smoother:
         width = float(np.clip(sigma, LEAST_WIDTH, MOST_WIDTH))
         base = partial(MODELS[name], sigma=sigma)
         found = penalised_spline(self._theta, rest, np.maximum(errors, LEAST_ERROR), width, base)
-        return Curve(name, sigma, gain, *found)
+        return Curve(name, sigma, gain, found.chi_squared, found.freedom, found.evaluate)
+
+
+@dataclass(frozen=True)
+class PenalisedSpline:
+    """A smoothing spline, and how well it agrees with the data."""
+
+    chi_squared: float
+    """Per degree of freedom."""
+    freedom: float
+    """Degrees of freedom that the spline takes."""
+    evaluate: Callable[[Array], Array]
+    """Angles, radians, to values."""
 
 
 def penalised_spline(
     theta: Array, values: Array, errors: Array, width: float, free: Callable[[Array], Array]
-) -> tuple[float, float, Callable[[Array], Array]]:
+) -> PenalisedSpline:
     """Find the stiffest spline that agrees with the values within their errors.
 
     Args:
@@ -115,9 +127,6 @@ def penalised_spline(
         errors: (B,) their standard errors.
         width: Width of the dense knots around the terminator, radians.
         free: A function of the angle; it, and it times sin theta, are not penalised.
-
-    Returns:
-        Chi-squared per degree of freedom, the degrees of freedom of the spline, and the spline.
     """
     from scipy.interpolate import BSpline  # late: scipy takes 0.2 s to load
 
@@ -151,7 +160,7 @@ def penalised_spline(
     target = max(noise_factor(values, errors), SLACK * least)
     best = next(entry for entry in reversed(found) if entry[0] <= target)
     kept = best[2]
-    return best[0], best[1], lambda angles: design(angles) @ kept
+    return PenalisedSpline(best[0], best[1], lambda angles: design(angles) @ kept)
 
 
 def noise_factor(values: Array, errors: Array) -> float:
