@@ -20,7 +20,7 @@ CONSTANT_TOLERANCE = 0.005
 FLAT_TOLERANCE = 1e-3
 
 
-class MeanCurvature(NamedTuple):
+class CurvatureMeans(NamedTuple):
     """Means over a mesh, 1/unit, in the order of the curvature attribute."""
 
     kappa: float
@@ -44,7 +44,7 @@ class CurvatureSummary:
     """95th percentile of kappa; the maximum of a real mesh is at a crease, and means little."""
     mean_high: float
     """95th percentile of the absolute mean curvature."""
-    mean_values: MeanCurvature
+    mean_values: CurvatureMeans
 
 
 def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
@@ -54,7 +54,7 @@ def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
     used &= np.isfinite(mesh.vertices).all(axis=1)
     kappa = field.kappa[used]
     low, median, high = np.percentile(kappa, (5.0, 50.0, 95.0))
-    means = MeanCurvature(
+    means = CurvatureMeans(
         *(float(values[used].mean()) for values in (field.kappa, field.k1, field.k2, field.mean))
     )
     points = mesh.vertices[used]
@@ -71,5 +71,5 @@ def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
     return CurvatureSummary(kind, float(low), float(median), float(high), mean_high, means)
 
 
-FLAT_SUMMARY = CurvatureSummary(FLAT, 0.0, 0.0, 0.0, 0.0, MeanCurvature(0.0, 0.0, 0.0, 0.0))
+FLAT_SUMMARY = CurvatureSummary(FLAT, 0.0, 0.0, 0.0, 0.0, CurvatureMeans(0.0, 0.0, 0.0, 0.0))
 """Of a mesh that is flat everywhere."""
