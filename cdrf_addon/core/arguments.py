@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every model of reflectance takes: an angle and a blur width, checked, folded, broadcast."""
+"""The arguments of every reflectance model: an angle and a blur width, checked and folded."""
 
 from __future__ import annotations
 
@@ -21,11 +21,14 @@ if TYPE_CHECKING:
 
 
 def checked(theta: ArrayLike, sigma: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fold theta into [0, pi]; both keep their shapes, which are to be broadcast.
+    """Check both arguments and fold theta into [0, pi]; their shapes stay as they are.
 
     Args:
         theta: Angle between normal and light, radians, any shape, any finite value.
-        sigma: Blur width, radians, any shape, in [0, inf].
+        sigma: Blur width, radians, in [0, inf], any shape that broadcasts with theta's.
+
+    Returns:
+        theta and sigma, float64.
 
     Raises:
         ParameterError: theta is not finite, or sigma is negative or not a number.
@@ -36,7 +39,7 @@ def checked(theta: ArrayLike, sigma: ArrayLike) -> tuple[NDArray[np.float64], ND
         raise ParameterError("The angle between normal and light must be a finite number.")
     if np.isnan(width).any() or (width < 0.0).any():
         raise ParameterError("The blur width sigma must be zero or positive, not negative or NaN.")
-    # Folding rounds, so angles that need none are left to the last bit.
+    # Folding rounds, so angles that need none are not touched.
     folded = np.abs(np.remainder(angle + math.pi, 2.0 * math.pi) - math.pi)
     return np.where(angle > math.pi, folded, angle), width
 
@@ -49,9 +52,9 @@ def evaluate_forms(
     Args:
         theta: As for `checked`.
         sigma: As for `checked`, broadcast against theta; 0 gives max(cos theta, 0) to the last bit.
-        series_from: The sigma from which on the series is used.
+        series_from: Least sigma for which the series is used, radians.
         narrow: Called with flat arrays of the same length, 0 < sigma < series_from.
-        series: Called with arrays that are only to be broadcast, so that a table costs little.
+        series: Called with arrays that it has to broadcast, so that a table costs little.
 
     Returns:
         The values clipped to [0, 1], as rounding may leave -1e-17 or 1 + 1e-16.

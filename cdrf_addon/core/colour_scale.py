@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours for curvature: hot (paper, Fig. 3a), and blue to red for signed values."""
+"""Colour scales for curvature: hot (the paper's Fig. 3a), and blue to red for signed values."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ SIGNED: Scale = (
     (1.0, (1.0, 0.05, 0.0)),
 )
 MARK_COLOUR = (0.0, 0.8, 0.1)
-"""Of vertices whose curvature was filled in."""
+"""Colour of vertices whose curvature comes from their neighbours."""
 
 
 def colours(part: ArrayLike, scale: Scale) -> NDArray[np.float64]:
-    """Linear colours, (..., 3), of values from 0 to 1."""
+    """Return the linear colours, (..., 3), of values from 0 to 1."""
     positions = [position for position, _ in scale]
     values = np.asarray(part, dtype=np.float64)
     return np.stack(
@@ -45,15 +45,15 @@ def srgb(linear: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def ticks(low: float, high: float, unit: float) -> list[tuple[float, str]]:
-    """Places from 0 to 1 along the scale and what to write there.
+    """Return the labels of a colour scale.
 
     Args:
-        low: Value at the scale's beginning.
-        high: Value at its end.
-        unit: Metres in a unit of the lengths whose inverse the values are.
+        low: Curvature at the scale's beginning, 1/unit.
+        high: Curvature at its end, 1/unit.
+        unit: Metres in a unit of length.
 
     Returns:
-        Five marks: the curvature per metre and, in words, the radius it means.
+        Five marks: the place from 0 to 1, and the curvature per metre with the radius it means.
     """
     marks = []
     for place in (0.0, 0.25, 0.5, 0.75, 1.0):
@@ -63,6 +63,7 @@ def ticks(low: float, high: float, unit: float) -> list[tuple[float, str]]:
 
 
 def _radius(kappa: float) -> str:
+    """Write the radius of a curvature in 1/m."""
     if abs(kappa) < 1e-9:
         return "  flat"
     radius = 1.0 / abs(kappa)

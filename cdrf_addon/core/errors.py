@@ -3,11 +3,11 @@
 
 
 class CdrfError(Exception):
-    """Base of every error the extension raises on purpose; its text is shown to the artist."""
+    """Base of every error that the extension raises on purpose; the artist reads its text."""
 
 
 class ParameterError(CdrfError):
-    """A number is outside the range in which the theory means anything."""
+    """A number is outside the range for which the theory is defined."""
 
 
 class MeshError(CdrfError):
@@ -15,7 +15,7 @@ class MeshError(CdrfError):
 
 
 class SceneError(CdrfError):
-    """The scene, object or material is not in a state the operation can work on."""
+    """The scene, object or material is not in a state that the operation can work on."""
 
 
 class DependencyError(CdrfError):

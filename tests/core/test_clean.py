@@ -168,7 +168,7 @@ def test_faces_to_a_vertex_that_has_flown_off_are_left_out() -> None:
         assert result.report.stray_faces == touching.sum() == 5
         assert len(result.triangles) == (~touching).sum()
         assert result.source[0] == -1
-        # The rest keeps its unit: one edge in a thousand says nothing about the median.
+        # The rest keeps its unit: one edge in a thousand does not move the median.
         assert result.edge == pytest.approx(np.median(edge_lengths(vertices, faces)), rel=0.05)
     near = vertices.copy()
     near[0] *= 1e3
@@ -251,7 +251,7 @@ def test_each_piece_keeps_the_side_of_most_of_its_faces() -> None:
 
 
 @pytest.mark.smoke
-def test_a_moebius_strip_is_told() -> None:
+def test_a_moebius_strip_is_reported() -> None:
     vertices, faces = moebius()
     result = cleaned(vertices, faces)
     assert result.report.non_orientable
@@ -262,7 +262,7 @@ def test_a_moebius_strip_is_told() -> None:
     assert not cleaned(vertices, open_band).report.non_orientable
 
 
-def test_edges_of_three_faces_say_nothing_about_winding() -> None:
+def test_edges_of_three_faces_determine_no_winding() -> None:
     # Three fins on one edge cannot be wound alike; each stays as it is.
     angles = np.arange(3) * 2.0 * math.pi / 3.0
     fins = np.stack((np.cos(angles), np.sin(angles), np.zeros(3)), 1)

@@ -307,18 +307,18 @@ def isolated_vertices() -> Arrays:
 def work(name: str) -> None:
     """Compute one case and print the outcome as JSON."""
     vertices, faces = CASES[name][0]()
-    told: dict[str, object] = {}
+    outcome: dict[str, object] = {}
     try:
         mesh = TriMesh.from_arrays(vertices, faces)
         field = principal_curvatures(mesh)
         values = np.stack((field.kappa, field.k1, field.k2, field.mean))
-        told["finite"] = bool(np.isfinite(values).all())
-        told["whole"] = values.shape == (4, len(mesh.vertices))
-        told["median"] = summarise(mesh, field).median
-        told["sentences"] = field.sentences()
+        outcome["finite"] = bool(np.isfinite(values).all())
+        outcome["whole"] = values.shape == (4, len(mesh.vertices))
+        outcome["median"] = summarise(mesh, field).median
+        outcome["sentences"] = field.sentences()
     except CdrfError as refusal:
-        told["refusal"] = str(refusal)
-    print(json.dumps(told))
+        outcome["refusal"] = str(refusal)
+    print(json.dumps(outcome))
 
 
 @pytest.mark.parametrize("name", list(CASES))
@@ -333,21 +333,21 @@ def test_no_crash_no_hang_no_nonsense(name: str, record_property) -> None:
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    record_property("outcome", told.get("refusal") or f"median κ {told['median']:.3g}")
+    outcome = json.loads(done.stdout)
+    record_property("outcome", outcome.get("refusal") or f"median κ {outcome['median']:.3g}")
     expected = CASES[name][1]
     if isinstance(expected, str):
-        text = told["refusal"]
+        text = outcome["refusal"]
         assert expected in text
         assert text[0].isupper()
         assert text.endswith(".")
     else:
-        assert told.get("refusal") is None
-        assert told["finite"]
-        assert told["whole"]
+        assert outcome.get("refusal") is None
+        assert outcome["finite"]
+        assert outcome["whole"]
         low, high = expected
-        assert low <= told["median"] <= high
-        assert all(line.endswith(".") for line in told["sentences"])
+        assert low <= outcome["median"] <= high
+        assert all(line.endswith(".") for line in outcome["sentences"])
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ def test_gentle_waves_and_twisted_strips_are_not() -> None:
 
 
 @pytest.mark.smoke
-def test_bad_meshes_are_left_to_those_who_can_tell() -> None:
+def test_bad_meshes_are_left_to_the_full_measurement() -> None:
     vertices, faces = plane(5)
     broken = vertices.copy()
     broken[3] = np.nan

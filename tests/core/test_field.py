@@ -126,8 +126,8 @@ def test_the_estimate_converges_to_the_surface(name: str, irregular: bool, metho
     factor = CUBIC_FACTOR if method == "CUBIC" else 1.0
     for key, values in measured.items():
         allowed = [factor * most for most in ACCURACY[key]]
-        told = " ".join(f"{value:.2e}" for value in values)
-        assert all(got <= most for got, most in zip(values, allowed, strict=True)), (key, told)
+        numbers = " ".join(f"{value:.2e}" for value in values)
+        assert all(got <= most for got, most in zip(values, allowed, strict=True)), (key, numbers)
     # The edge halves from one resolution to the next.
     mean_rms = np.array([values[2] for values in measured.values()])
     order = np.log2(mean_rms[:-1] / mean_rms[1:])

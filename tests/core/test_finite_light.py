@@ -17,7 +17,7 @@ pytestmark = pytest.mark.smoke
 # Half-angle in radians and the worst error of the irradiance in units of its peak. A Gaussian has
 # no hard horizon, so the fit is what it is: the error is 0.9 % of the half-angle to 0.4 rad and
 # grows faster beyond. Each row is the measured error rounded up by a tenth or less (the first by a
-# fifth); the rows in degrees are those the docstring of core/finite_light.py states.
+# fifth); the rows in degrees are those the docstring of finite_light.py states.
 WORST = [
     (0.01, 1e-4),
     (0.05, 4.8e-4),

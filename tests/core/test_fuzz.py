@@ -117,7 +117,7 @@ def options_of(number: int) -> Options:
 
 
 def judge(seed: int, number: int) -> str:
-    """Compute the curvature of a mesh; say "fine", "refused" or what went wrong."""
+    """Compute the curvature of a mesh; return "fine", "refused" or what went wrong."""
     _, vertices, triangles = draw(seed, number)
     start = time.perf_counter()
     try:
@@ -160,7 +160,7 @@ def bends(mesh: CleanMesh) -> bool:
     unit = normals.scaled / normals.doubled_area
     edges = shared_edges(mesh.triangles, len(mesh.vertices))
     cosine = (unit[:, edges.face] * unit[:, edges.other]).sum(axis=0)
-    # Folded flat on itself, a surface has no curvature to speak of either.
+    # Folded flat on itself, a surface has no meaningful curvature either.
     return bool(((cosine < math.cos(math.radians(5.0))) & (cosine > -0.9)).any())
 
 

@@ -77,7 +77,7 @@ def test_impossible_measurements_are_refused(
 
 
 def test_pixels_are_pooled_with_their_error() -> None:
-    """Independent pixels of known noise: the bins' means scatter as their errors say."""
+    """Independent pixels of known noise: the bins' means scatter by their errors."""
     rng = np.random.default_rng(SEED)
     passes = 8
     cosine = np.repeat(np.linspace(-0.9, 0.9, 40), 15)

@@ -33,7 +33,7 @@ def test_albedo_is_that_of_the_paper(key: str) -> None:
     assert PRESETS[key].albedo == pytest.approx(REFLECTANCE[key], abs=TOLERANCE["table"])
 
 
-def test_every_preset_says_where_it_comes_from() -> None:
+def test_every_preset_names_its_source() -> None:
     for key, preset in PRESETS.items():
         assert min(preset.sigma0) > 0.0
         assert all(0.0 <= part <= 1.0 for part in preset.albedo)

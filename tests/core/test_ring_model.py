@@ -21,7 +21,7 @@ from cdrf_addon.core.reflectance.ring_model import SERIES_FROM, ring_reflectance
 pytestmark = pytest.mark.smoke
 
 TOLERANCE = {
-    # What issue 2 promises, and a thousandth of it: the docstring of `ring_reflectance` says 1e-12.
+    # What issue 2 promises, and a thousandth of it: `ring_reflectance` promises 1e-12.
     "promised": 1e-9,
     "documented": 1e-12,
     # The references agree far below the rounding of float64.

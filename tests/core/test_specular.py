@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdrf_addon.core.reflectance.specular import dielectric_f0, glossy_albedo
+from cdrf_addon.core.reflectance.specular import dielectric_f0, specular_albedo
 
 
 def albedo(cosine: float, roughness: float, f0: float, steps: int = 200) -> float:
@@ -37,7 +37,7 @@ def test_fit_against_integration() -> None:
     for cosine in (0.05, 0.1, 0.2, 0.4, 0.7, 1.0):
         for roughness in (0.1, 0.3, 0.5, 0.8, 1.0):
             for f0 in (0.03, 0.04, 0.08):
-                fit = float(glossy_albedo(cosine, roughness, f0))
+                fit = float(specular_albedo(cosine, roughness, f0))
                 errors[cosine, roughness, f0] = fit - albedo(cosine, roughness, f0)
     values = np.array(list(errors.values()))
     facing = np.array([error for (cosine, *_), error in errors.items() if cosine >= 0.2])
@@ -51,6 +51,6 @@ def test_fit_against_integration() -> None:
 def test_limits() -> None:
     assert dielectric_f0(1.5) == pytest.approx(0.04)
     assert dielectric_f0(1.0) == 0.0 and dielectric_f0(1.5, 0.0) == 0.0
-    assert glossy_albedo(0.01, 0.1, 0.0) == 0.0
-    grid = glossy_albedo(np.linspace(0.0, 1.0, 50)[:, None], np.linspace(0.0, 1.0, 50), 0.3)
+    assert specular_albedo(0.01, 0.1, 0.0) == 0.0
+    grid = specular_albedo(np.linspace(0.0, 1.0, 50)[:, None], np.linspace(0.0, 1.0, 50), 0.3)
     assert (grid >= 0.0).all() and (grid <= 1.0).all()

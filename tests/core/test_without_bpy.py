@@ -61,17 +61,17 @@ def test_every_module_works_where_blender_is_not() -> None:
         env=environment,
     )
     assert done.returncode == 0, done.stderr
-    told = dict(line.split(": ", 1) for line in done.stdout.splitlines())
-    assert told["early"] == "[]"
-    assert told["blender"] == "[]"
+    printed = dict(line.split(": ", 1) for line in done.stdout.splitlines())
+    assert printed["early"] == "[]"
+    assert printed["blender"] == "[]"
     assert {
         "errors",
         "curvature.field",
         "curvature.clean",
         "reflectance.lut",
         "reflectance.ring_model",
-    } <= set(told["modules"].split())
+    } <= set(printed["modules"].split())
     # The lobe's edges are more than 5 sigma away: what is left is exp(-sigma^2 / 2) cos(0).
-    assert told["reflectance"] == "0.9560"
+    assert printed["reflectance"] == "0.9560"
     # z = -c (x^2 + y^2) has k1 = k2 = 2 c = 0.1 at its top, and a quadric is fitted exactly.
-    assert told["mean"] == "0.1000"
+    assert printed["mean"] == "0.1000"

@@ -180,7 +180,7 @@ class _Neighbours:
     """Pairs of neighbouring patches, and the least squares of a gradient over them."""
 
     here: Indices
-    """(e,) one patch of each pair; every pair stands there both ways."""
+    """(e,) one patch of each pair; each pair is listed in both directions."""
     there: Indices
     """(e,) the other."""
     weight: list[Points]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,16 @@ FLAT, CONSTANT, VARYING = "FLAT", "CONSTANT", "VARYING"
 CONSTANT_TOLERANCE = 0.005
 # kappa times the mesh's size below which bending is invisible (and float32 noise of a plane).
 FLAT_TOLERANCE = 1e-3
+
+
+class CurvatureMeans(NamedTuple):
+    """Means over a mesh, 1/unit, in the order of the curvature attribute."""
+
+    kappa: float
+    k1: float
+    k2: float
+    mean: float
+    """Mean of the signed mean curvature."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +44,7 @@ class CurvatureSummary:
     """95th percentile of kappa; the maximum of a real mesh is at a crease, and means little."""
     mean_high: float
     """95th percentile of the absolute mean curvature."""
-    mean_values: tuple[float, float, float, float]
-    """Means of kappa, k1, k2 and signed mean curvature."""
+    mean_values: CurvatureMeans
 
 
 def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
@@ -44,8 +54,8 @@ def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
     used &= np.isfinite(mesh.vertices).all(axis=1)
     kappa = field.kappa[used]
     low, median, high = np.percentile(kappa, (5.0, 50.0, 95.0))
-    means = tuple(
-        float(values[used].mean()) for values in (field.kappa, field.k1, field.k2, field.mean)
+    means = CurvatureMeans(
+        *(float(values[used].mean()) for values in (field.kappa, field.k1, field.k2, field.mean))
     )
     points = mesh.vertices[used]
     size = float(np.ptp(points, axis=0).max())
@@ -58,8 +68,8 @@ def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
         if spread <= 4.0 * CONSTANT_TOLERANCE * kappa.mean():
             kind = CONSTANT
     mean_high = float(np.percentile(np.abs(field.mean[used]), 95.0))
-    return CurvatureSummary(kind, float(low), float(median), float(high), mean_high, means)  # type: ignore[arg-type]
+    return CurvatureSummary(kind, float(low), float(median), float(high), mean_high, means)
 
 
-FLAT_SUMMARY = CurvatureSummary(FLAT, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+FLAT_SUMMARY = CurvatureSummary(FLAT, 0.0, 0.0, 0.0, 0.0, CurvatureMeans(0.0, 0.0, 0.0, 0.0))
 """Of a mesh that is flat everywhere."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reflectance taken from path-traced spheres, and fits to it."""
+"""Reflectance measured on path-traced spheres, fits to it, and the model made of it."""

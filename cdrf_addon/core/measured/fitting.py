@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+# Closed forms by the name that results and command lines use.
 MODELS: dict[str, Callable[..., Array]] = {"ring": ring_reflectance, "sphere": sphere_reflectance}
 # Widths tried before the best of them is refined; 0 is Lambert.
 SIGMAS = np.concatenate(([0.0], np.geomspace(1e-3, 8.0, 120)))
@@ -25,11 +26,14 @@ SIGMA_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Fit:
-    """The best width and gain of a model, and what it leaves: RMS in units of max(cos, 0)."""
+    """The best width and gain of a model."""
 
     sigma: float
+    """Blur width, radians."""
     gain: float
+    """Factor on the model."""
     rms: float
+    """RMS error that remains, in units of max(cos, 0)."""
 
 
 class ModelFitter:
@@ -48,12 +52,13 @@ class ModelFitter:
         self._table = self._model(theta[None, :], SIGMAS[:, None])
 
     def _gain(self, model: Array, values: Array) -> Array:
-        """Gain of least squares, over the last axis."""
+        """Return the gain of least squares, over the last axis."""
         power = (model**2 * self._weights).sum(axis=-1)
         found: Array = (model * values * self._weights).sum(axis=-1) / power
         return found
 
     def _rms(self, model: Array, values: Array, gain: float | None) -> tuple[Array, Array]:
+        """Return the RMS error over the last axis, and the gain."""
         scale = self._gain(model, values) if gain is None else np.full(model.shape[:-1], gain)
         left = ((scale[..., None] * model - values) ** 2 * self._weights).sum(axis=-1)
         return np.sqrt(left), scale
@@ -63,7 +68,7 @@ class ModelFitter:
 
         Args:
             values: (B,) radiance / (albedo * irradiance / pi).
-            gain: Factor on the model; None leaves it free.
+            gain: Factor on the model; None fits it.
         """
         from scipy.optimize import minimize_scalar  # late: scipy takes 0.2 s to load
 

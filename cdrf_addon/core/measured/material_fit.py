@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's Section 4 for a whole measurement: sigma0 per channel, and how well each model does.
+"""The paper's Section 4 for a whole measurement: sigma0 per channel, and the error of each model.
 
-Every sphere is fitted with the gain fixed at 1 and with the gain free. Where light enters and
-leaves a curved body, the lit side grows brighter as well as blurred, and a fit with the gain fixed
-answers with sigma = 0 on large spheres; so sigma0, the slope of sigma against kappa, is taken from
-the fits with a free gain. It is in units of the scatter radius (radius * scale of Blender's node).
+Every sphere is fitted with the gain fixed at 1 and with the gain free. On a curved body, scattering
+makes the lit side brighter as well as blurred, and a fit with the gain fixed results in sigma = 0
+on large spheres; so sigma0, the slope of sigma against kappa, is taken from the fits with a free
+gain. It is in units of the scatter radius (radius * scale of Blender's node).
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ class ChannelFit:
     """All fits of one channel; lists run over the spheres.
 
     Attributes:
-        albedo: Of the channel.
+        albedo: Albedo of the channel.
         fixed: Fits with gain 1, by model.
         free: Fits with a free gain, by model.
-        lambert: RMS of Lambert.
+        lambert: RMS error of Lambert.
         noise: RMS of the Monte-Carlo error.
         sigma0: By model, in units of the scatter radius.
         proportional_to: By model, the scale beyond which sigma is more than a tenth off sigma0 *
-            kappa; infinity if it never is.
+            kappa; infinity if it nowhere is.
     """
 
     albedo: float
@@ -63,11 +63,13 @@ class MaterialFit:
     """The fits of a measurement's three channels."""
 
     scales: Array
+    """(S,) scatter radius * kappa of each sphere, ascending."""
     weighting: str
+    """EQUATOR or SOLID_ANGLE."""
     channels: tuple[ChannelFit, ChannelFit, ChannelFit]
 
     def sentences(self) -> list[str]:
-        """What was found, in words."""
+        """Describe the results, a sentence for each channel and model."""
         lines = []
         for name, channel in zip(CHANNELS, self.channels, strict=True):
             for model in MODELS:
@@ -90,13 +92,16 @@ def sigma0_at(
 ) -> tuple[float, float, float]:
     """Return sigma0 of each channel for which sigma0 * kappa is the fitted sigma at one curvature.
 
-    On strongly curved forms sigma stops growing, so what is right there is less than the slope.
+    On strongly curved forms sigma stops growing, so the right value there is below the slope.
 
     Args:
         fit: The fits.
         model: A key of MODELS.
-        radius: Scatter radius of each channel.
-        kappa: Curvature for which sigma is to be right, 1/unit of the radius; 0 takes the slope.
+        radius: Scatter radius of each channel, any unit of length.
+        kappa: Curvature for which sigma is to be right, 1/unit; 0 takes the slope.
+
+    Returns:
+        sigma0 of red, green and blue, in the unit of the radii.
     """
     found = []
     for channel, own in zip(fit.channels, radius, strict=True):
@@ -111,27 +116,31 @@ def sigma0_at(
 
 
 def proportional(scales: Array, sigma: Array) -> tuple[float, float]:
-    """Slope of sigma against scale where it is small, and the scale at which that ends.
+    """Find the slope of sigma against scale where it is small, and the scale at which that ends.
+
+    Args:
+        scales: (S,) scatter radius * kappa of the spheres, ascending.
+        sigma: (S,) fitted widths, radians.
 
     Raises:
-        MeasurementError: No two spheres are in the range.
+        MeasurementError: Fewer than two spheres are in the range.
     """
     used = (sigma >= PROPORTIONAL_FROM) & (sigma <= PROPORTIONAL_TO)
     if used.sum() < 2:
         raise MeasurementError(
-            "The spheres do not scatter as little as the fit needs: too much of the measurement is "
+            "Too few spheres scatter as little as the fit needs: too much of the measurement is "
             "noise. Measure again at a finer quality."
         )
-    # The median of the ratios: one noisy sphere does not move it.
+    # The median, which one noisy sphere does not move.
     slope = float(np.median(sigma[used] / scales[used]))
-    # The last that still is proportional: before it noise may put one off, after it saturation all.
+    # The last that is still proportional: before it, noise may put one off; beyond, all saturate.
     held = np.flatnonzero(np.abs(sigma / (slope * scales) - 1.0) <= PROPORTIONAL_WITHIN)
     last = int(held[-1]) if len(held) else int(np.flatnonzero(used)[0])
     return slope, np.inf if last == len(scales) - 1 else float(scales[last])
 
 
 def sigma_per_scale(measurement: SphereMeasurement, channel: int) -> float:
-    """Slope of the sphere model's sigma against the scale, for one channel.
+    """Find the slope of the sphere model's sigma against the scale, for one channel, 0 to 2.
 
     Raises:
         MeasurementError: The measurement has too few spheres that scatter little.
@@ -142,7 +151,7 @@ def sigma_per_scale(measurement: SphereMeasurement, channel: int) -> float:
 
 
 def fit_material(measurement: SphereMeasurement, weighting: str = EQUATOR) -> MaterialFit:
-    """Fit ring and sphere to every sphere and channel.
+    """Fit the ring and the sphere model to every sphere and channel.
 
     Args:
         measurement: The spheres.

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was measured on path-traced spheres, with the Monte-Carlo error beside it, and its file.
+"""A measurement of path-traced spheres: values, their Monte-Carlo errors, and its file.
 
-Everything here is in float64 and free of Blender. Values are radiance / (albedo * irradiance / pi),
-so that Lambert is max(cos theta, 0); they may exceed 1, as a small translucent body collects light
-from all sides.
+Values are radiance / (albedo * irradiance / pi), so that Lambert is max(cos theta, 0); they may
+exceed 1, as a small translucent body collects light from all sides. All arrays are float64.
 """
 
 from __future__ import annotations
@@ -27,17 +26,17 @@ if TYPE_CHECKING:
 
 MAGIC = "cdrf sphere measurement"
 FORMAT = 2
-# What numpy and zipfile raise on files that are damaged or none of theirs.
+# What numpy and zipfile raise on damaged or foreign files.
 DAMAGED = (
     *(OSError, ValueError, EOFError, AttributeError, TypeError, KeyError, NotImplementedError),
     *(RuntimeError, SyntaxError, zipfile.BadZipFile, zlib.error, tokenize.TokenError),
 )
-# No body sends out so many times what an opaque one does.
+# No body reflects so many times the light of an opaque one.
 MOST_VALUE = 100.0
-# Bins of theta in radians, where the pixels are not in columns of equal N.L.
+# Width of a bin of theta, radians, where the pixels are not in columns of equal N.L.
 BIN = math.radians(3.0)
 LEAST_PIXELS = 3
-# Where hardly any path finds the light, a few passes see no scatter at all; no error is below this.
+# Few passes differ where hardly any path reaches the light; no error is taken for less than this.
 LEAST_ERROR = 1e-5
 
 
@@ -45,21 +44,21 @@ LEAST_ERROR = 1e-5
 class SphereMeasurement:
     """Radiance of unit spheres that differ in the scale of their scatter radius.
 
-    Channels do not mix in Cycles: each column c of `values` holds for any material whose channel
-    has the albedo `albedo[c]` and the scatter distance radius * scale / r on a sphere of radius r.
+    Channels do not mix in Cycles: column c of `values` holds for any material whose channel has the
+    albedo `albedo[c]` and the scatter distance radius * scale / r on a sphere of radius r.
 
     Attributes:
         albedo: (3,) colour of the material, in (0, 1].
         scales: (S,) radius * scale * kappa of each sphere, ascending, positive.
         cosine: (B,) N.L of each bin, ascending, in [-1, 1].
         values: (S, 3, B) radiance / (albedo * irradiance / pi).
-        errors: (S, 3, B) standard error of the values, from the scatter between passes.
+        errors: (S, 3, B) standard error of the values, from the deviations between passes.
         samples: Paths through each pixel, all passes together.
         seed: Seed of the first pass.
         blender: Version that rendered.
         method: Subsurface method of the node, as Blender names it.
         elevation: Angle of the light from the picture's plane towards the camera, radians.
-        all_views: True if the spheres were seen from all sides and their pixels put together.
+        all_views: True if the spheres were rendered from all sides and their pixels pooled.
     """
 
     albedo: Array
@@ -99,21 +98,21 @@ class SphereMeasurement:
         return np.asarray(np.arccos(self.cosine))
 
     def energy(self) -> Array:
-        """Mean over the sphere relative to Lambert's 1/4, (S, 3): 1 is a material that keeps it."""
+        """Return the mean over the sphere relative to Lambert's 1/4, (S, 3): 1 conserves it."""
         weights = solid_angle_weights(self.theta)
         return np.asarray((self.values * weights).sum(axis=-1) * 4.0)
 
 
 def solid_angle_weights(theta: Array) -> Array:
-    """Weights (B,) with sum 1 of bins at descending angles, by the area they have on the sphere."""
+    """Weigh bins at descending angles, (B,), by their area on the sphere; the sum is 1."""
     edges = _edges(theta)
     return np.asarray(np.diff(np.cos(edges)) / 2.0)
 
 
 def equator_weights(theta: Array) -> Array:
-    """Weights (B,) with sum 1 of bins at descending angles, uniform in theta, as in the paper.
+    """Weigh bins at descending angles, (B,), uniformly in theta as in the paper; the sum is 1.
 
-    The bins next to the poles count as wide as their neighbours are, not as far as to the poles.
+    The bins next to the poles are symmetric about their angles, and do not reach to the poles.
     """
     edges = _edges(theta)
     edges[0] = min(math.pi, 2.0 * theta[0] - edges[1])
@@ -122,14 +121,15 @@ def equator_weights(theta: Array) -> Array:
 
 
 def _edges(theta: Array) -> Array:
+    """Return the edges of the bins, (B + 1,), from pi to 0."""
     middle = (theta[1:] + theta[:-1]) / 2.0
     return np.concatenate(([math.pi], middle, [0.0]))
 
 
 def bin_pixels(cosine: Array) -> NDArray[np.int64]:
-    """Number of the bin of each pixel, (P,); bin 0 has the least N.L, each at least 3 pixels.
+    """Number the bin of each pixel, (P,); bin 0 has the least N.L, each at least 3 pixels.
 
-    Pixels in columns of equal N.L make a bin each; others are put together by their angle.
+    Each column of equal N.L makes a bin; pixels without such columns are pooled by their angle.
     """
     rounded = cosine.round(9)
     if len(np.unique(rounded)) > len(cosine) // 2:
@@ -174,10 +174,10 @@ def pool(
     members = np.zeros((len(numbers), len(count)))
     members[np.arange(len(numbers)), numbers] = 1.0
     mean = total / passes
-    # Of the mean over the passes; never below zero by rounding.
+    # Variance of the mean over the passes; rounding must not make it negative.
     variance = np.maximum(square / passes - mean**2, 0.0) / (passes - 1)
     values = np.einsum("spc,pb->scb", mean, members, optimize=True) / count
-    # The variance of a pixel changes slowly with its angle; neighbours make its estimate firmer.
+    # The variance changes slowly with the angle, so neighbouring bins improve its estimate.
     each = np.einsum("spc,pb->scb", variance, members, optimize=True)
     padded = np.concatenate((each[..., :1], each, each[..., -1:]), axis=-1)
     counts = np.concatenate((count[:1], count, count[-1:]))
@@ -187,7 +187,7 @@ def pool(
 
 
 def save(path: Path, measurement: SphereMeasurement) -> None:
-    """Write a measurement as .npz, whole or not at all.
+    """Write a measurement as .npz, completely or not at all.
 
     Raises:
         MeasurementError: The file cannot be written.
@@ -208,7 +208,7 @@ def load(path: Path) -> SphereMeasurement:
     """Read a measurement.
 
     Raises:
-        MeasurementError: There is no such file, or it holds something else.
+        MeasurementError: There is no such file, or it holds no measurement of this format.
     """
     try:
         with np.load(path, allow_pickle=False) as file:

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reflectance as it was measured on path-traced spheres: the paper's Fig. 2 made the table.
+"""The measured model: the paper's Fig. 2, taken from path-traced spheres, as the table.
 
 Neighbouring rows differ little, so each curve is smoothed once more across them, as far as its
-Monte-Carlo error allows; that takes a third off its noise. Cubics in the logarithm of the scale
-make eight rows an octave of them; each is made to fall with theta, as light does, and between them
+Monte-Carlo error allows; that removes a third of its noise. Cubics in the logarithm of the scale
+interpolate eight rows an octave; each is made to fall with theta, as light does, and between them
 the table is linear.
-Below the first row the curve stays, and only from a 16th of it down it turns into Lambert, which is
-exact at 0: Cycles itself has that step (a vanishing scatter radius scatters still, and Blender's
-albedo then is up to 7 % off; at radius 0 it is Lambert). Beyond the last row nothing changes.
+
+Below the first row the curve is constant, and turns into Lambert only below a 16th of its scale; it
+is exactly Lambert at 0. Cycles itself has that step (a vanishing scatter radius still scatters, and
+Blender's albedo is then up to 7 % off; at radius 0 it is Lambert). Beyond the last row the curve is
+constant.
 """
 
 from __future__ import annotations
@@ -30,18 +32,19 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Angles of the table, closer together at the terminator; linear in between, below 2e-5 off.
+# Angles of the table, denser at the terminator; linear in between, with an error below 2e-5.
 NODES = 401
 CROWDING = 1.5
 # Part of the first row's scale below which the curve turns into Lambert.
 LAMBERT_BELOW = 1.0 / 16.0
-# Rows made of each measured one.
+# Rows interpolated for each measured one.
 ROWS_BETWEEN = 4
-# Part of the points' variance that is left in a curve smoothed along theta, about.
+# Part of the points' variance that remains in a curve smoothed along theta, roughly.
 NOISE_LEFT = 0.25
 
 
 def _angles() -> Array:
+    """Return the table's angles, (NODES,), ascending, radians."""
     place = np.linspace(-1.0, 1.0, NODES)
     return np.asarray(math.pi / 2.0 * (1.0 + np.sign(place) * np.abs(place) ** CROWDING))
 
@@ -50,11 +53,11 @@ class MeasuredModel:
     """f(theta, sigma) per channel, from one measurement and the channels' scatter radii.
 
     Args:
-        measurement: Spheres whose rows serve every channel.
+        measurement: The spheres.
         radius: (3,) scatter radii of red, green and blue, any unit; only their ratio counts. A
             channel of radius 0 is Lambert.
-        sigma_per_scale: c in sigma = c * scale, where scale belongs to the channel of the largest
-            radius; None takes the sphere model's, so that sigma0 means the same in every model.
+        sigma_per_scale: c in sigma = c * scale for the channel of the largest radius; None takes
+            the sphere model's, so that sigma0 means the same in every model.
 
     Attributes:
         ratio: (3,) radii, the largest 1.
@@ -98,13 +101,13 @@ class MeasuredModel:
         self._place, self._rows = _between(place, rows)
 
     def energy(self) -> Array:
-        """Mean over the sphere relative to Lambert's, of the measured rows, (S, 3)."""
-        # numpy 1.26, which Blender 4.5 has, knows no trapezoid.
+        """Return the mean of each measured row over the sphere, relative to Lambert's, (S, 3)."""
+        # Blender 4.5 has numpy 1.26, in which there is no np.trapezoid.
         heights = self._rows[::ROWS_BETWEEN] * np.sin(self._theta)
         return np.asarray((heights[..., 1:] + heights[..., :-1]) @ np.diff(self._theta))
 
     def chi_squared(self) -> Array:
-        """Per degree of freedom, of each smoothed curve, (S, 3)."""
+        """Return chi-squared per degree of freedom of each smoothed curve, (S, 3)."""
         return np.array([[curve.chi_squared for curve in row] for row in self.curves])
 
     def evaluate(self, theta: ArrayLike, sigma: ArrayLike) -> Array:
@@ -127,12 +130,13 @@ class MeasuredModel:
         result = np.empty((len(angle), 3))
         for channel in range(3):
             factor = self.ratio[channel] / self.sigma_per_scale
-            # Infinity times a radius of 0 is no number.
+            # Infinity times a radius of 0 is NaN.
             scale = width * factor if factor > 0.0 else np.zeros_like(width)
             result[:, channel] = self._channel(angle, scale, channel)
         return result.reshape(*shape, 3)
 
     def _channel(self, theta: Array, scale: Array, channel: int) -> Array:
+        """Look one channel up at flat arrays of angle and scale, (n,)."""
         first, last = self.measurement.scales[[0, -1]]
         log = np.log(np.clip(scale, first, last))
         row = np.clip(np.searchsorted(self._place, log, side="right"), 1, len(self._place) - 1)
@@ -170,7 +174,7 @@ def measured_model(
     slopes = [fitted_sigma_per_scale(spheres, channel) for channel in range(3)]
     widths = [own * slope for own, slope in zip(radius, slopes, strict=True)]
     sigma0 = max(widths)
-    # Rows are counted by the widest blur, scales by the largest radius.
+    # sigma belongs to the widest blur, scale to the largest radius.
     table = MeasuredModel(spheres, radius, sigma0 / max(radius) if sigma0 > 0.0 else None)
     red, green, blue = (float(width / sigma0) ** 2 for width in widths)
     facts = [spheres.blender, spheres.method, spheres.seed, spheres.samples]
@@ -182,14 +186,14 @@ def measured_model(
 
 
 def _between(place: Array, rows: Array) -> tuple[Array, Array]:
-    """Put rows between the rows by cubics in the scale's logarithm; make all fall with theta.
+    """Interpolate rows by cubics in the scale's logarithm, and make all of them fall with theta.
 
     Args:
         place: (S,) logarithms of the scales.
         rows: (S, 3, N) curves at ascending angles.
 
     Returns:
-        (D,) and (D, 3, N), none below 0.
+        Logarithms of the scales, (D,), and curves, (D, 3, N), none below 0.
     """
     slopes = np.gradient(rows, place, axis=0)
     parts = [rows[:1]]
@@ -199,7 +203,7 @@ def _between(place: Array, rows: Array) -> tuple[Array, Array]:
             slope = slopes[low] * t * (1.0 - t) ** 2 + slopes[low + 1] * t**2 * (t - 1.0)
             parts.append((value + step * slope)[None])
     dense = np.maximum(np.concatenate(parts), 0.0)
-    # The nearest falling curve lies between these two, which noise alone keeps apart.
+    # The closest falling curve lies between these two, which differ by noise alone.
     over = np.maximum.accumulate(dense[..., ::-1], axis=-1)[..., ::-1]
     under = np.minimum.accumulate(dense, axis=-1)
     where = np.interp(np.arange((len(place) - 1) * ROWS_BETWEEN + 1) / ROWS_BETWEEN,

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smooth a measured shading curve, but no further than its Monte-Carlo error allows.
+"""Smooth a measured shading curve, as far as its Monte-Carlo error allows.
 
 The curve is split into the best closed-form model, which has the sharp terminator of a small
 scatter distance, and a remainder. The remainder becomes a penalised spline (Eilers and Marx 1996),
-as stiff as the discrepancy principle (Morozov 1966) lets it be: chi-squared per degree of freedom
-reaches 1. Its knots are close together where the shading ends, about the width of the blur.
+as stiff as the discrepancy principle (Morozov 1966) allows: chi-squared per degree of freedom
+reaches 1. Its knots are dense around the terminator, within about the width of the blur.
 
-Of the closed-form model two multiples are free of the penalty: itself, and itself times sin theta.
-Cycles' walk enters the surface half by refraction, so that low albedos look brighter at grazing
-angles, and sin theta is, up to a factor, how squarely the pixels of one N.L are seen on average
+Two multiples of the closed-form model are not penalised: itself, and itself times sin theta. The
+walk of Cycles enters the surface partly by refraction, so that low albedos look brighter at grazing
+angles, and sin theta is, up to a factor, the mean cosine to the viewer over the pixels of one N.L
 when the light comes from the side.
 """
 
@@ -29,19 +29,19 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Rows that a cubic is fitted to; more lose detail, a higher degree keeps noise.
+# Rows that a cubic is fitted to: more would lose detail, a higher degree would keep noise.
 ROWS_AT_ONCE, ROW_DEGREE = 7, 3
 LEAST_MOVE = 1e-12
 INTERVALS = 32
 STIFFNESSES = 10.0 ** np.arange(-4.0, 9.0, 0.25)
-# The spline's knots are closest within this many radians of the terminator.
+# The spline's knots are densest within this many radians of the terminator.
 LEAST_WIDTH, MOST_WIDTH = 0.02, 0.5
-# Chi-squared may be this much above the least that any stiffness reaches, if that is above 1.
+# Factor by which chi-squared may exceed the least that any stiffness reaches, if that is above 1.
 SLACK = 1.1
 RIDGE = 1e-10
 # Median of the absolute value of a normal variable.
 NORMAL_MEDIAN = 0.6745
-# A bin no path reached is not exact.
+# Least error of a bin: one that no path reached is not exact.
 LEAST_ERROR = 1e-4
 
 
@@ -51,10 +51,10 @@ class Curve:
 
     Attributes:
         model: Name of the closed-form part.
-        sigma: Its width.
+        sigma: Its width, radians.
         gain: Its gain.
-        chi_squared: Per degree of freedom, of the whole curve against the measured values.
-        freedom: Degrees of freedom the spline took.
+        chi_squared: Chi-squared per degree of freedom of the curve against the measured values.
+        freedom: Degrees of freedom of the spline.
     """
 
     model: str
@@ -65,25 +65,25 @@ class Curve:
     _spline: Callable[[Array], Array]
 
     def __call__(self, theta: Array) -> Array:
-        """Evaluate at any angles in [0, pi]; never negative."""
+        """Evaluate at any angles in [0, pi], radians; never negative."""
         base = self.gain * MODELS[self.model](theta, self.sigma)
         return np.maximum(base + self._spline(theta), 0.0)
 
 
 def _stretch(theta: Array, width: float) -> Array:
-    """Coordinate in which the knots are uniform: half of them crowd around the terminator."""
+    """Map angles to a coordinate in which the knots are uniform, half of them at the terminator."""
     x = theta - math.pi / 2.0
     crowded = np.arcsinh(x / width) / math.asinh(math.pi / 2.0 / width)
     return np.asarray(crowded + x * (2.0 / math.pi))
 
 
 class Smoother:
-    """Smooths curves measured at the same angles.
+    """Smooths curves that were measured at the same angles.
 
     Args:
         theta: (B,) angles of the bins, radians.
-        weights: (B,) for the fit of the closed-form part.
-        models: Closed forms to choose from.
+        weights: (B,) weights for the fit of the closed-form part.
+        models: Names of the closed forms to choose from.
     """
 
     def __init__(
@@ -101,23 +101,32 @@ class Smoother:
         width = float(np.clip(sigma, LEAST_WIDTH, MOST_WIDTH))
         base = partial(MODELS[name], sigma=sigma)
         found = penalised_spline(self._theta, rest, np.maximum(errors, LEAST_ERROR), width, base)
-        return Curve(name, sigma, gain, *found)
+        return Curve(name, sigma, gain, found.chi_squared, found.freedom, found.evaluate)
+
+
+@dataclass(frozen=True)
+class PenalisedSpline:
+    """A smoothing spline, and how well it agrees with the data."""
+
+    chi_squared: float
+    """Per degree of freedom."""
+    freedom: float
+    """Degrees of freedom that the spline takes."""
+    evaluate: Callable[[Array], Array]
+    """Angles, radians, to values."""
 
 
 def penalised_spline(
     theta: Array, values: Array, errors: Array, width: float, free: Callable[[Array], Array]
-) -> tuple[float, float, Callable[[Array], Array]]:
+) -> PenalisedSpline:
     """Find the stiffest spline that agrees with the values within their errors.
 
     Args:
-        theta: (B,) angles.
-        values: (B,) to smooth.
+        theta: (B,) angles, radians.
+        values: (B,) values to smooth.
         errors: (B,) their standard errors.
-        width: Of the crowd of knots around the terminator, radians.
+        width: Width of the dense knots around the terminator, radians.
         free: A function of the angle; it, and it times sin theta, are not penalised.
-
-    Returns:
-        Chi-squared per degree of freedom, the degrees the spline took, and the spline.
     """
     from scipy.interpolate import BSpline  # late: scipy takes 0.2 s to load
 
@@ -137,7 +146,7 @@ def penalised_spline(
     bend[:, :-2] = np.diff(np.eye(count - 2), 2, axis=0)
     normal = basis.T @ (basis / errors[:, None] ** 2)
     right = basis.T @ (values / errors**2)
-    # One more unknown than data is no trouble: the penalty decides what the data leave open.
+    # More unknowns than data do no harm: the penalty determines what the data leave open.
     scale = float(np.trace(normal)) / count
     found = []
     for stiffness in STIFFNESSES:
@@ -151,14 +160,19 @@ def penalised_spline(
     target = max(noise_factor(values, errors), SLACK * least)
     best = next(entry for entry in reversed(found) if entry[0] <= target)
     kept = best[2]
-    return best[0], best[1], lambda angles: design(angles) @ kept
+    return PenalisedSpline(best[0], best[1], lambda angles: design(angles) @ kept)
 
 
 def noise_factor(values: Array, errors: Array) -> float:
-    """Squared ratio of the noise to the stated errors, at least 1, from second differences.
+    """Estimate the squared ratio of the noise to the stated errors, at least 1.
 
-    Pixels of one bin see it from different directions, which scatters them a little more than the
-    paths do. The median is not moved by the few bins where the curve itself bends.
+    The pixels of one bin are seen at different angles, so they differ a little more than by the
+    noise of the paths. The estimate is the median of the second differences, which the few bins
+    where the curve itself bends do not move.
+
+    Args:
+        values: (B,) values at ascending or descending angles.
+        errors: (B,) their stated standard errors.
     """
     second = values[:-2] - 2.0 * values[1:-1] + values[2:]
     expected = np.sqrt(errors[:-2] ** 2 + 4.0 * errors[1:-1] ** 2 + errors[2:] ** 2)
@@ -166,15 +180,18 @@ def noise_factor(values: Array, errors: Array) -> float:
 
 
 def smooth_rows(place: Array, rows: Array, noise: Array) -> Array:
-    """Smooth across rows by local cubics (Savitzky and Golay 1964), no further than their noise.
+    """Smooth across rows by local cubics (Savitzky and Golay 1964), as far as their noise allows.
 
-    Seven rows, three octaves, are fitted by a cubic and its value at the row is taken; near the
-    ends the last seven. Four rows or fewer come back as they are.
+    A cubic is fitted to seven rows, three octaves, and evaluated at the middle one; near the ends
+    to the last seven. Four rows or fewer stay as they are.
 
     Args:
-        place: (S,) where the rows stand: the logarithm of their scale.
+        place: (S,) logarithm of each row's scale.
         rows: (S, C, N) curves.
         noise: (S, C) standard error of each curve, RMS: no curve is moved by more than that.
+
+    Returns:
+        (S, C, N) smoothed curves.
     """
     window = min(ROWS_AT_ONCE, len(place))
     degree = min(ROW_DEGREE, window - 1)

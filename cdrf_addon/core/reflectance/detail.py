@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a surface's fine detail survives the light that spreads under it.
+"""The part of a normal map's fine detail that is left by the light that scatters under it.
 
 On a nearly flat surface the irradiance that a bump or normal map modulates with the wavelength L is
 blurred by the diffusion profile, which multiplies the modulation by the profile's transfer function
-at k = 2 pi / L. As the irradiance is linear in the normal, the same factor may be applied to the
-normal: a blend from the surface's own (0) to the mapped one (1), for each channel its own.
+at k = 2 pi / L. As the irradiance is linear in the normal, the same factor can be applied to the
+normal: a blend from the surface's own (0) to the mapped one (1), different for each channel.
 
 The profile is Christensen and Burley's (2015), (exp(-r/d) + exp(-r/3d)) / (8 pi d r), a fit of
 path-traced skin and other media; its core keeps more detail than a Gaussian of the same width. With
@@ -26,22 +26,21 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 PHASE = 2.0 * math.pi / math.sqrt(7.0)
-"""k d over sigma0 / L."""
+"""k d over sigma0 / L, radians."""
 DETAIL_PER_SIGMA0 = 2.0
-"""Wavelength taken for a map's detail at first, over the largest sigma0. With skin's ratio of 1,
-0.35, 0.2 it leaves 36, 70 and 85 % of red, green and blue; FaceWorks' fixed blends are 0, 70 and
-100 %."""
+"""Default wavelength of a map's detail over the largest sigma0. With skin's ratio of 1, 0.35, 0.2
+it leaves 36, 70 and 85 % of red, green and blue; FaceWorks' fixed blends are 0, 70 and 100 %."""
 
 
 def detail_left(sigma0: ArrayLike, size: ArrayLike) -> NDArray[np.float64]:
-    """Part of a map's detail that a channel keeps.
+    """Return the part of a map's detail that a channel keeps.
 
     Args:
         sigma0: Scatter distance, any unit of length, 0 or more.
         size: Wavelength of the detail in the same unit; 0 keeps all.
 
     Returns:
-        1 (all, sigma0 = 0) to 0, of the broadcast shape.
+        From 1 (all; sigma0 = 0) down to 0, of the broadcast shape.
     """
     scatter, wavelength = np.broadcast_arrays(
         np.asarray(sigma0, dtype=np.float64), np.asarray(size, dtype=np.float64)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The energy a reflectance sends out over a whole sphere, and models that keep it.
+"""The energy that a whole sphere sends out, and models that conserve it.
 
-A path-traced sphere that scatters far is up to a third brighter than Lambert's: it is curved the
-same way everywhere, so light that leaves one place arrives at another. A head is not. With that
-gain, the measured table is further from path tracing than Lambert on heads; divided by it, as close
-as the sphere model (docs/results/model_choice.md).
+A path-traced sphere of a long scatter distance is up to a third brighter than Lambert's: it is
+convex everywhere, so light that is lost in one place emerges in another. A head is not convex. With
+that gain, the measured table is further from path tracing than Lambert on heads; divided by it, it
+is as close as the sphere model (docs/results/model_choice.md).
 """
 
 from __future__ import annotations
@@ -18,15 +18,24 @@ if TYPE_CHECKING:
 
     from ..arguments import Evaluate
 
-# Between these widths, radians, the energy is tabulated; beyond them it is that at the ends.
+# The energy is tabulated between these widths, radians, and constant beyond.
 FIRST_SIGMA, LAST_SIGMA, WIDTHS = 1e-7, 10.0, 512
+# Of the quadrature over the sphere.
 NODES = 256
 
 
 def sphere_energy(evaluate: Evaluate, sigma: ArrayLike) -> NDArray[np.float64]:
-    """Mean over the sphere relative to Lambert's 1/4, of sigma's shape and the model's channels.
+    """Integrate a model over the sphere, relative to Lambert's mean of 1/4.
 
-    Gauss-Legendre in cos theta on either side of the terminator, where Lambert has its corner.
+    Gauss-Legendre quadrature in cos theta on either side of the terminator, where max(cos theta, 0)
+    has its corner.
+
+    Args:
+        evaluate: The model.
+        sigma: Blur widths, radians, any shape.
+
+    Returns:
+        1 where no energy is gained or lost, of sigma's shape and the model's channels.
     """
     node, weight = np.polynomial.legendre.leggauss(NODES // 2)
     cosine = np.concatenate(((node - 1.0) / 2.0, (node + 1.0) / 2.0))
@@ -37,14 +46,14 @@ def sphere_energy(evaluate: Evaluate, sigma: ArrayLike) -> NDArray[np.float64]:
 
 
 def conserving(evaluate: Evaluate) -> Evaluate:
-    """Divide a model with colour by its energy, channel by channel; what it divides is above 0."""
+    """Divide a model with colour by its energy, channel by channel; the energy must be above 0."""
     widths = np.concatenate(([0.0], np.geomspace(FIRST_SIGMA, LAST_SIGMA, WIDTHS)))
     energy = sphere_energy(evaluate, widths)
 
-    def kept(theta: ArrayLike, sigma: ArrayLike) -> NDArray[np.float64]:
+    def conserved(theta: ArrayLike, sigma: ArrayLike) -> NDArray[np.float64]:
         values = evaluate(theta, sigma)
         width = np.broadcast_to(np.asarray(sigma, dtype=np.float64), values.shape[:-1])
         gain = np.stack([np.interp(width, widths, part) for part in energy.T], axis=-1)
         return np.asarray(values / gain)
 
-    return kept
+    return conserved

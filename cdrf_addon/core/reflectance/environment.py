@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light from all around: a world's radiance as spherical harmonics, filtered as the skin filters.
+"""Environment light: a world's radiance in spherical harmonics, filtered by the reflectance.
 
-The irradiance of a convex surface is its surroundings' radiance blurred by max(cos, 0), and 99 % of
-it lies in the bands 0 to 2 (Ramamoorthi and Hanrahan 2001). A translucent sphere blurs with
-f(theta, sigma) instead, so band l is multiplied by
+The irradiance of a convex surface is its surroundings' radiance convolved with max(cos, 0), and
+99 % of it lies in the bands 0 to 2 (Ramamoorthi and Hanrahan 2001). A translucent sphere convolves
+it with f(theta, sigma) instead, so band l is multiplied by
 
     A_l(sigma) = 2 pi integral of f(theta, sigma) P_l(cos theta) sin theta d theta,
 
 which for diffusion on the sphere is A_l(0) exp(-l (l + 1) sigma^2 / 2), A_l(0) = pi, 2 pi/3, pi/4.
 
 One small bright source (the sun of an HDRI) has more in the higher bands than three can hold: it is
-taken out and shaded like any other light of its size.
+separated and shaded like any other light of its size.
 
 Directions are world space, Z up. Arrays of harmonics are (9, 3): m within l, then the colours.
 """
@@ -49,7 +49,7 @@ _NORMS = (
 BAND_ROWS = 512
 """Rows of a table of band factors: between them they are linear to 3e-5."""
 
-# A source is taken out if it is this many times brighter than the mean, lies within this angle of
+# A source is separated if it is this many times brighter than the mean, lies within this angle of
 # its brightest spot, and gives at least this part of the mean irradiance.
 BRIGHT = 4.0
 SUN_REACH = math.radians(30.0)
@@ -65,33 +65,33 @@ class Sun:
     direction: tuple[float, float, float]
     """Unit vector towards it."""
     radiance: tuple[float, float, float]
-    """What a white Lambert surface facing it sends out, per channel: irradiance / pi."""
+    """Radiance of a white Lambert surface that faces it, per channel: irradiance / pi."""
     sin2_half_angle: float
-    """Squared sine of the half-angle of a disc that is spread as it is."""
+    """Squared sine of the half-angle of a disc of the same spread."""
 
 
 @dataclass(frozen=True)
 class Environment:
-    """What lights a convex surface from all around."""
+    """The light that a convex surface receives from all around."""
 
     harmonics: NDArray[np.float64]
-    """(9, 3): radiance in bands 0 to 2, the sun's left out."""
+    """(9, 3): radiance in bands 0 to 2, without the sun's."""
     sun: Sun | None = None
 
     @property
     def is_black(self) -> bool:
-        """Tell whether nothing comes from anywhere."""
+        """Whether no light comes from any direction."""
         return self.sun is None and not np.abs(self.harmonics).max() > 0.0
 
     @property
     def is_uniform(self) -> bool:
-        """Tell whether the same comes from everywhere, to a part in ten thousand."""
+        """Whether the radiance is the same in all directions, to a part in ten thousand."""
         rest = float(np.abs(self.harmonics[1:]).max())
         return self.sun is None and rest <= 1e-4 * float(np.abs(self.harmonics[0]).max())
 
 
 def polynomials(direction: ArrayLike) -> NDArray[np.float64]:
-    """Polynomials behind the harmonics, (..., 9): 1; x, y, z; xy, yz, zx; 3z^2-1, x^2-y^2."""
+    """Evaluate the harmonics' polynomials, (..., 9): 1; x, y, z; xy, yz, zx; 3z^2-1, x^2-y^2."""
     d = np.asarray(direction, dtype=np.float64)
     x, y, z = np.moveaxis(d, -1, 0)
     return np.stack(
@@ -100,9 +100,13 @@ def polynomials(direction: ArrayLike) -> NDArray[np.float64]:
 
 
 def panorama_directions(height: int, width: int) -> NDArray[np.float64]:
-    """Directions of an equirectangular picture's pixels, (height, width, 3), row 0 at the bottom.
+    """Return the directions of an equirectangular picture's pixels, row 0 at the bottom.
 
-    The picture of a camera that looks along +Y with +Z up: its centre is +Y, its right half +X.
+    It is the picture of a camera that looks along +Y with +Z up: its centre is +Y, its right half
+    +X.
+
+    Returns:
+        (height, width, 3) unit vectors, world space.
     """
     azimuth = 2.0 * math.pi * ((np.arange(width) + 0.5) / width - 0.5)
     elevation = math.pi * ((np.arange(height) + 0.5) / height - 0.5)[:, None]
@@ -112,19 +116,19 @@ def panorama_directions(height: int, width: int) -> NDArray[np.float64]:
 
 
 def solid_angles(height: int, width: int) -> NDArray[np.float64]:
-    """Solid angle of each pixel, (height, 1); they add up to 4 pi exactly."""
+    """Return the solid angle of each pixel, (height, 1), steradians; the sum is exactly 4 pi."""
     edges = np.sin(math.pi * (np.arange(height + 1) / height - 0.5))
     return np.asarray(np.diff(edges)[:, None] * (2.0 * math.pi / width))
 
 
 def project(panorama: ArrayLike, *, sun_threshold: float = 0.0) -> Environment:
-    """Sum up a panorama.
+    """Project a panorama on the harmonics, its sun separated.
 
     Args:
-        panorama: Radiance, (height, width, 3), laid out as in `panorama_directions`. What is no
-            number or negative counts as black.
+        panorama: Radiance, (height, width, 3), laid out as in `panorama_directions`. NaN and
+            negative values count as black.
         sun_threshold: As Blender's World > Sun Threshold: what is brighter than this, or than a few
-            times the mean, may be taken out as a sun. 0 takes nothing out.
+            times the mean, may be separated as a sun. 0 separates nothing.
 
     Raises:
         ParameterError: The panorama has another shape.
@@ -148,14 +152,24 @@ def _take_sun(
     weight: NDArray[np.float64],
     threshold: float,
 ) -> tuple[Sun | None, NDArray[np.float64]]:
-    """Split a panorama into its sun, if it has one, and the rest."""
+    """Split a panorama into its sun, if it has one, and the rest.
+
+    Args:
+        picture: (height, width, 3) radiance, finite.
+        direction: (height, width, 3) unit vectors of the pixels.
+        weight: (height, 1) solid angles.
+        threshold: As in `project`.
+
+    Returns:
+        The sun, and the picture without it.
+    """
     peak = picture.max(axis=-1)
     mean = float((picture * weight[..., None]).sum()) / 4.0  # irradiance averaged over the sphere
     threshold = min(threshold, BRIGHT * mean / (3.0 * math.pi))
     if not (threshold > 0.0 and peak.max() > threshold):
         return None, picture
     excess = picture * np.clip(1.0 - threshold / np.maximum(peak, threshold), 0.0, 1.0)[..., None]
-    # The brightest spot is where most light comes from, not the brightest pixel.
+    # The brightest spot is the one most light comes from, not the brightest pixel.
     flux = excess * weight[..., None]
     total = flux.sum(axis=-1)
     centre = _brightest(total, direction)
@@ -176,9 +190,9 @@ def _take_sun(
 
 
 def _brightest(flux: NDArray[np.float64], direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Direction around which most flux lies: mean shift from the strongest pixel, (3,)."""
+    """Find the direction around which most flux lies, (3,): mean shift from the strongest cell."""
     flat, towards = flux.ravel(), direction.reshape(-1, 3)
-    # Rows near the poles have narrow pixels, so the start is sought in coarse cells.
+    # Pixels near the poles are narrow, so the search starts in coarse cells.
     cells = np.round(towards * 8.0).astype(np.int64) @ np.array([1, 64, 4096])
     names, member = np.unique(cells, return_inverse=True)
     sums = np.bincount(member.ravel(), weights=flat, minlength=len(names))
@@ -192,17 +206,16 @@ def _brightest(flux: NDArray[np.float64], direction: NDArray[np.float64]) -> NDA
 
 
 def uniform(colour: ArrayLike) -> Environment:
-    """The environment in which the same radiance comes from everywhere."""
+    """Return the environment in which this radiance comes from all directions."""
     harmonics = np.zeros((9, 3))
     harmonics[0] = np.asarray(colour, dtype=np.float64) / _NORMS[0]
     return Environment(harmonics)
 
 
 def shader_coefficients(harmonics: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Coefficients of `polynomials` in the radiance of a white Lambert surface, (9, 3).
+    """Return the coefficients of `polynomials` in the radiance of a white Lambert surface, (9, 3).
 
-    Norms and A_l(0) / pi are multiplied in; what is left to the shader are the factors
-    A_l(sigma) / A_l(0).
+    Norms and A_l(0) / pi are multiplied in; the shader multiplies the factors A_l(sigma) / A_l(0).
     """
     factors = np.array([LAMBERT_FACTORS[band] for band in BAND_OF]) / math.pi
     return np.asarray(harmonics * (np.array(_NORMS) * factors)[:, None])
@@ -211,7 +224,7 @@ def shader_coefficients(harmonics: NDArray[np.float64]) -> NDArray[np.float64]:
 def lit_by(
     harmonics: NDArray[np.float64], normal: ArrayLike, factors: ArrayLike
 ) -> NDArray[np.float64]:
-    """Radiance of a white surface under the harmonics, as the shader computes it.
+    """Return the radiance of a white surface under the harmonics, as the shader computes it.
 
     Args:
         harmonics: (9, 3).
@@ -227,10 +240,14 @@ def lit_by(
 
 
 def band_factors(model: Model, sigma: ArrayLike) -> NDArray[np.float64]:
-    """A_l(sigma) / A_l(0) for l = 0, 1, 2: what is left of each band.
+    """Return the factor A_l(sigma) / A_l(0) by which the blur damps each band, l = 0, 1, 2.
 
-    In closed form on the sphere, where 1 is left of band 0: no energy is won or lost. Else by
-    Gauss-Legendre quadrature on both sides of the terminator, 1e-7.
+    In closed form for the sphere model, which keeps all of band 0: no energy is gained or lost. For
+    the others by Gauss-Legendre quadrature on both sides of the terminator, to 1e-7.
+
+    Args:
+        model: The reflectance.
+        sigma: Blur widths, radians, any shape.
 
     Returns:
         (..., 3 bands) of sigma's shape; (..., 3 channels, 3 bands) where the model has colour.
@@ -250,9 +267,9 @@ def band_factors(model: Model, sigma: ArrayLike) -> NDArray[np.float64]:
 
 
 def _quadrature(nodes: int = 48) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Nodes and weights in cos theta, with intervals that halve towards the terminator.
+    """Return nodes and weights in cos theta, in intervals that shrink towards the terminator.
 
-    f has a layer as thin as sigma there; what is left out of it is below 2^-20.
+    f has a layer as thin as sigma there; the part of it that is neglected is below 2^-20.
     """
     x, w = np.polynomial.legendre.leggauss(nodes)
     edges = [0.0, *(2.0**-k for k in range(10, -1, -2))]
@@ -268,16 +285,16 @@ def _quadrature(nodes: int = 48) -> tuple[NDArray[np.float64], NDArray[np.float6
 def bands_of_table(
     table: NDArray[np.float64], layout: LutLayout = DEFAULT_LAYOUT
 ) -> NDArray[np.float64]:
-    """Band factors of a model by its look-up table, which a file holds where the model is gone.
+    """Return the band factors of a look-up table, as a .blend keeps it after the model is gone.
 
     Accurate to 1e-4, read as the shader reads it.
 
     Args:
-        table: (height, width, 3) or (height, width), as of `lut.build_lut`.
-        layout: The table's.
+        table: (height, width, 3) or (height, width), from `lut.build_lut`.
+        layout: The table's layout.
 
     Returns:
-        (BAND_ROWS, 3 channels, 3 bands), rows evenly over the table's own axis of sigma.
+        (BAND_ROWS, 3 channels, 3 bands), rows evenly spaced on the table's own axis of sigma.
     """
     from scipy.interpolate import CubicSpline  # late: scipy takes 0.2 s to load
 
@@ -304,7 +321,15 @@ def _root(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def sample_bands(bands: NDArray[np.float64], variance: ArrayLike) -> NDArray[np.float64]:
-    """Read `bands_of_table` as the shader does, (..., 3 channels, 3 bands)."""
+    """Read `bands_of_table` as the shader does.
+
+    Args:
+        bands: (BAND_ROWS, 3 channels, 3 bands).
+        variance: sigma^2, any shape.
+
+    Returns:
+        (..., 3 channels, 3 bands).
+    """
     part = np.minimum(np.asarray(variance, dtype=np.float64) / VARIANCE_MAX, 1.0) ** 0.25
     place = part * (BAND_ROWS - 1.0)
     row = np.minimum(place.astype(np.int64), BAND_ROWS - 2)
@@ -313,9 +338,17 @@ def sample_bands(bands: NDArray[np.float64], variance: ArrayLike) -> NDArray[np.
 
 
 def reduce_picture(pixels: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
-    """Shrink a picture to (height, width, channels) by the mean of the pixels under each new one.
+    """Shrink a picture by averaging the pixels under each new one.
 
-    Unlike a renderer's samples this misses no pixel: the sun of an HDRI is a few of millions.
+    Unlike a renderer's samples, this misses no pixel: the sun of an HDRI is a few of millions.
+
+    Args:
+        pixels: (H, W, channels).
+        height: New number of rows, at most H.
+        width: New number of columns, at most W.
+
+    Returns:
+        (height, width, channels).
     """
     rows = np.linspace(0.0, pixels.shape[0], height, endpoint=False).astype(np.int64)
     columns = np.linspace(0.0, pixels.shape[1], width, endpoint=False).astype(np.int64)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The two-dimensional look-up table of a reflectance model, and the mapping of its axes.
 
-Columns: q = sign(c) sqrt|c| of c = cos theta, dense at the terminator where f bends.
+Columns: q = sign(c) sqrt|c| of c = cos theta, dense at the terminator, where f bends.
 Rows:    w = (variance / VARIANCE_MAX)^(1/4) = sqrt(sigma / SIGMA_MAX), dense at small sigma.
 
 The shader reads the image through Blender's *tube* projection, the one that samples without mip
-levels (decision 002). There (sin p, cos p, v) has u = (1 - p / pi) / 2,
-so p = pi K q with K slightly under 1 keeps clear of the seam. K and the row offset put the ends of
-both axes on texel centres, where bilinear filtering is exact.
+levels (decision 002). There (sin p, cos p, v) has u = (1 - p / pi) / 2, so p = pi K q with K
+slightly below 1 avoids the seam. K and the row offset put the ends of both axes on texel centres,
+where bilinear filtering is exact.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class LutLayout:
 
     @property
     def seam_factor(self) -> float:
-        """K: the part of the tube's circumference that the cosine axis covers."""
+        """K, the part of the tube's circumference that the cosine axis covers."""
         return 1.0 - (2.0 * SEAM_TEXELS + 1.0) / self.width
 
     @property
@@ -62,7 +62,7 @@ class LutLayout:
 
     @property
     def row_scale(self) -> float:
-        """Extent in v from sigma = 0 to SIGMA_MAX, centre of the last row."""
+        """Extent in v from sigma = 0 to SIGMA_MAX, the centre of the last row."""
         return (self.height - 1.0) / self.height
 
 
@@ -70,20 +70,24 @@ DEFAULT_LAYOUT = LutLayout()
 
 
 def cosine_axis(layout: LutLayout = DEFAULT_LAYOUT) -> NDArray[np.float64]:
-    """Cosine of theta at each texel column, shape (width,); clipped to [-1, 1] in the margins."""
+    """Return cos theta at each texel column, (width,), clipped to [-1, 1] in the margins."""
     u = (np.arange(layout.width) + 0.5) / layout.width
     q = np.clip((1.0 - 2.0 * u) / layout.seam_factor, -1.0, 1.0)
     return np.asarray(np.sign(q) * q**2)
 
 
 def sigma_axis(layout: LutLayout = DEFAULT_LAYOUT) -> NDArray[np.float64]:
-    """Standard deviation sigma at each texel row in radians, shape (height,)."""
+    """Return sigma at each texel row, (height,), radians."""
     w = np.arange(layout.height) / (layout.height - 1.0)
     return np.asarray(SIGMA_MAX * w**2)
 
 
 def build_lut(model: Model, layout: LutLayout = DEFAULT_LAYOUT) -> NDArray[np.float32]:
     """Tabulate a model, row 0 at sigma = 0; float64 until it is stored.
+
+    Args:
+        model: The reflectance.
+        layout: Size of the table.
 
     Returns:
         (height, width), and where the model has colour (height, width, 3).
@@ -107,7 +111,7 @@ def sample_lut(
         layout: The layout the table was built with.
 
     Returns:
-        f interpolated, of the broadcast shape, with a last axis of 3 where the table has one.
+        f, interpolated, of the broadcast shape, with a last axis of 3 where the table has one.
     """
     q = np.sign(cosine) * np.sqrt(np.abs(cosine))
     u = (1.0 - layout.seam_factor * q) / 2.0

@@ -65,7 +65,7 @@ class Model:
     colour: bool = False
     """True where red, green and blue differ at the same sigma."""
     moments: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    """Variance of each channel's blur over sigma^2: what the blur of a large light adds to."""
+    """Variance of each channel's blur over sigma^2, to which that of a large light is added."""
     gain: float = SPHERE_GAIN
     """Part of a large light's variance in the exponent of its gain (finite_light.py)."""
 

@@ -34,13 +34,14 @@ class Profile:
     """A diffusion profile as a sum of Gaussians, per channel (d'Eon and Luebke 2007).
 
     Raises:
-        ParameterError: A number is negative or none, or a channel's weights do not add up to 1.
+        ParameterError: A number is negative, NaN or infinite, or a channel's weights do not add up
+            to 1.
     """
 
     widths: tuple[float, ...]
-    """Standard deviations, in any unit of length: only their ratios count."""
+    """Standard deviations of the Gaussians, any unit of length: only their ratios count."""
     weights: tuple[tuple[float, float, float], ...]
-    """Part of red, green and blue in each Gaussian; each channel is scaled to add up to 1."""
+    """Weights of red, green and blue in each Gaussian; each channel is scaled to add up to 1."""
     base: str = SPHERE
     """What each Gaussian is blurred along: RING or SPHERE."""
 

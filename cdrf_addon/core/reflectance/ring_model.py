@@ -32,7 +32,7 @@ _ERF_IS_ONE = 6.5
 
 
 def series_remainder(sigma: float, terms: int = SERIES_TERMS) -> float:
-    """Bound on the Fourier series' remainder after `terms` terms at standard deviation `sigma`.
+    """Bound the Fourier series' remainder after `terms` terms at standard deviation `sigma`.
 
     The terms fall at least as fast as a geometric series of ratio exp(-2 (2 terms + 3) sigma^2).
     """
@@ -67,7 +67,7 @@ def _lobes(theta: NDArray[np.float64], sigma: NDArray[np.float64]) -> NDArray[np
 
 
 def _lobe(theta: NDArray[np.float64], sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Convolve one lobe, cos on [-pi/2, pi/2], with the Gaussian; theta is the distance to it."""
+    """Convolve one lobe, cos on [-pi/2, pi/2], with the Gaussian; theta is the angle to it."""
     from scipy.special import erf  # late: scipy takes 0.2 s to load
 
     def end(position: float) -> NDArray[np.complex128]:
@@ -86,7 +86,7 @@ def _lobe(theta: NDArray[np.float64], sigma: NDArray[np.float64]) -> NDArray[np.
 
 
 def _series(theta: NDArray[np.float64], sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-    # exp(-sigma^2 ...) of an infinite sigma is a clean 0, but its square must not warn on the way.
+    # exp(-sigma^2 ...) of an infinite sigma is exactly 0; the square of a large one must not warn.
     with np.errstate(over="ignore", under="ignore"):
         variance = sigma**2
         total = np.asarray(1.0 / math.pi + 0.5 * np.exp(-0.5 * variance) * np.cos(theta))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sphere model: light diffuses over a sphere as heat does; no energy is gained or lost.
 
-f(theta, sigma) = exp(sigma^2 / 2 Laplacian) max(cos theta, 0) on the unit sphere. Where the paper's
-f is a Gaussian blur along a circle, and so exact on a cylinder lit across its axis, this is the
-blur along the sphere: its mean over the sphere is 1/4 for every sigma, as that of max(cos, 0).
+f(theta, sigma) = exp(sigma^2 / 2 Laplacian) max(cos theta, 0) on the unit sphere. The paper's f is
+a Gaussian blur along a circle, and so exact on a cylinder lit across its axis; this is the blur
+along the sphere. Its mean over the sphere is 1/4 for every sigma, as that of max(cos, 0).
 
 Two forms share the range of sigma:
 
@@ -17,7 +17,7 @@ Two forms share the range of sigma:
   where D(s) is the heat of that line after s. At the latitude x its equation is, for
   v = D sqrt(cos x), v' = v'' + (1/2 + tan^2(x) / 4) v; with x^2 for tan^2 it is a harmonic
   oscillator and v is Mehler's kernel (Mehler 1866). Its powers of s are integrated in closed form.
-  What is left out (x^4 / 6) is below 3e-10 at SERIES_FROM and falls as sigma^7.
+  What is neglected (x^4 / 6) is below 3e-10 at SERIES_FROM and falls as sigma^7.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 SERIES_FROM = 0.1
 SERIES_DEGREE = 82
-# cos(latitude) is only divided by where the line's heat has gone to nothing long before.
+# Least cos(latitude) to divide by; where it is smaller, the heat of the line is practically 0.
 LEAST_COSINE = 1e-3
 
 
@@ -70,7 +70,7 @@ def lambert_coefficients(degree: int) -> NDArray[np.float64]:
 
 
 def _series(theta: NDArray[np.float64], sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sum the series; theta and sigma are broadcast in the sum alone."""
+    """Sum the Legendre series; theta and sigma are broadcast in the sum alone."""
     x = np.cos(theta)
     before, legendre = np.ones_like(x), x
     coefficients = lambert_coefficients(SERIES_DEGREE)

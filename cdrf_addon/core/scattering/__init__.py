@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From what a material is made of to its scatter distance."""
+"""The scatter distance sigma0 of a material: from coefficients, presets or Blender's radius."""

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From measured scattering coefficients to sigma0, by the dipole of Jensen et al. (2001).
 
-Across a straight terminator the dipole's profile acts through its Fourier transform alone, which is
-closed: with q = sqrt(k^2 + s^2), s the effective transport coefficient and z_r, z_v the depths of
-the two sources, it is h(k) = (exp(-z_r q) + exp(-z_v q)) / (exp(-z_r s) + exp(-z_v s)). sigma0 is
-the Gaussian whose blurred terminator is closest to the dipole's. The dipole's second moment would
-be 3 % to 60 % more: its long faint tail counts for much there and is hardly seen.
+Across a straight terminator only the Fourier transform of the dipole's profile counts, which has a
+closed form: with q = sqrt(k^2 + s^2), s the effective transport coefficient and z_r, z_v the depths
+of the two sources, it is h(k) = (exp(-z_r q) + exp(-z_v q)) / (exp(-z_r s) + exp(-z_v s)). sigma0
+is that of the Gaussian whose blurred terminator is closest to the dipole's. The dipole's RMS width
+is 3 % to 60 % larger, as the long faint tail weighs heavily in it but is hardly visible.
 """
 
 from __future__ import annotations
@@ -19,14 +19,17 @@ from ..errors import ParameterError
 
 
 def mismatch(eta: float) -> float:
-    """Return A = (1 + F_dr) / (1 - F_dr): how much a boundary of that index reflects inwards."""
+    """Return A = (1 + F_dr) / (1 - F_dr) of a boundary of refractive index eta.
+
+    F_dr, the part of diffuse light that it reflects inwards, is the fit of Jensen et al. (2001).
+    """
     inside = -1.440 / eta**2 + 0.710 / eta + 0.668 + 0.0636 * eta
     return (1.0 + inside) / (1.0 - inside)
 
 
 @dataclass(frozen=True)
 class Medium:
-    """What a material does to one colour of light.
+    """Scattering properties of a material for one colour of light.
 
     Raises:
         ParameterError: A coefficient is not a positive number.
@@ -58,7 +61,7 @@ class Medium:
 
     @property
     def depths(self) -> tuple[float, float]:
-        """Depth of the real source and height of the virtual one, mm."""
+        """Depth of the real source and height of the virtual one, z_r and z_v, mm."""
         real = 1.0 / self.extinction
         return real, real * (1.0 + 4.0 / 3.0 * mismatch(self.eta))
 
@@ -89,7 +92,7 @@ class Medium:
 
         def distance(log_sigma: float) -> float:
             gaussian = np.exp(-0.5 * (math.exp(log_sigma) * k) ** 2)
-            return float(((h - gaussian) ** 2 / k**3).sum())  # dk / k is the same everywhere
+            return float(((h - gaussian) ** 2 / k**3).sum())  # dk / k is constant
 
         middle = math.log(self.rms_width)
         found = minimize_scalar(
@@ -98,5 +101,6 @@ class Medium:
         return float(math.exp(found.x))
 
     def _shares(self) -> list[tuple[float, float]]:
+        """Return depth and share of the two sources; the shares add up to 1."""
         weights = [math.exp(-depth * self.transport) for depth in self.depths]
         return [(d, w / sum(weights)) for d, w in zip(self.depths, weights, strict=True)]

@@ -2,8 +2,8 @@
 """From the radius of Blender's subsurface scattering to sigma0 of the sphere model.
 
 A random walk's reach over its radius is a function of the albedo: light that is seldom absorbed
-goes further. The numbers are the best fits to a path-traced head (results/model_choice.md), between
-those of its smaller and its larger radii. Other methods mean something else by the same radius:
+travels further. The numbers are the best fits to a path-traced head (docs/results/model_choice.md),
+between those of its smaller and its larger radii. Other methods interpret the radius differently:
 
 * the random walk of Blender 4.5, later called legacy, takes radius * 0.25 / pi as its mean free
   path where the present one takes the radius itself;
@@ -29,16 +29,17 @@ RANDOM_WALK, LEGACY = "RANDOM_WALK", "RANDOM_WALK_LEGACY"
 SKIN, BURLEY = "RANDOM_WALK_SKIN", "BURLEY"
 ALBEDOS = (0.0, 0.2, 0.5, 0.75, 0.9, 0.99, 1.0)
 SIGMA0_PER_RADIUS = (0.3, 0.45, 0.93, 1.5, 1.95, 2.6, 2.7)
+# Mean free path over radius in the legacy random walk, and d over radius in Burley's profile.
 OLD_FREE_PATH = 0.25 / math.pi
 # Refractive index that Blender's nodes have by default.
 ETA = 1.4
 
 
 def sigma0_per_radius(albedo: ArrayLike, method: str = RANDOM_WALK) -> NDArray[np.float64]:
-    """Factor from Blender's radius times scale to sigma0.
+    """Return the factor from Blender's radius times scale to sigma0.
 
     Args:
-        albedo: In [0, 1], any shape.
+        albedo: Albedo of the surface, clamped to [0, 1], any shape.
         method: Blender's name of the subsurface method; one that is not known counts as a random
             walk.
 
@@ -63,5 +64,5 @@ def _skin_free_path(albedo: NDArray[np.float64]) -> NDArray[np.float64]:
         s = np.sqrt(3.0 * (1.0 - middle))
         less = middle / 2.0 * (1.0 + np.exp(-depth * s)) * np.exp(-s) < albedo
         low, high = np.where(less, middle, low), np.where(less, high, middle)
-    # An albedo of 1 would never lose its light; Blender ends at 0.999999 too.
+    # With an albedo of 1 no light would be lost; Blender, too, ends at 0.999999.
     return np.asarray(np.sqrt(3.0 * (1.0 - np.minimum(low, 0.999999))))

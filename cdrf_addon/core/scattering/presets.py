@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials by name: sigma0 in millimetres for red, green and blue, and where it comes from."""
+"""Materials by name: sigma0 in millimetres for red, green and blue, and its source."""
 
 from __future__ import annotations
 
@@ -16,16 +16,19 @@ ARTIST = "an artist's choice, not measured"
 
 @dataclass(frozen=True)
 class Preset:
-    """A material; what was measured of it says where sigma0 comes from."""
+    """A material, and the source of its numbers."""
 
     label: str
     sigma0: Colour
     """Scatter distance, mm. For measured media that of `Medium.sigma0`, to three digits."""
     albedo: Colour
+    """Diffuse reflectance of a flat surface."""
     source: str
+    """Publication, or ARTIST."""
     media: tuple[Medium, Medium, Medium] | None = None
+    """Measured coefficients of red, green and blue."""
     model: str = SPHERE
-    """Kind of the model of reflectance it is meant for."""
+    """Kind of the reflectance model it is meant for."""
 
     @property
     def description(self) -> str:
@@ -35,6 +38,7 @@ class Preset:
 
 
 def _measured(label: str, sigma0: Colour, scattering: Colour, absorption: Colour) -> Preset:
+    """Make a preset from Jensen's reduced scattering and absorption coefficients, 1/mm."""
     eta = 1.5 if label == "Marble" else 1.3  # as in the paper's figures
     red, green, blue = (Medium(s, a, eta) for s, a in zip(scattering, absorption, strict=True))
     albedo = (red.albedo, green.albedo, blue.albedo)
@@ -72,7 +76,7 @@ PRESETS: dict[str, Preset] = {
 
 
 def in_units(sigma0: Colour, unit_scale: float, size: float = 1.0) -> tuple[float, Colour]:
-    """Turn millimetres into a scene's units.
+    """Convert millimetres to a scene's units.
 
     Args:
         sigma0: Scatter distance of each channel, mm.
