@@ -41,8 +41,8 @@ from ...measuring.process import (
     cache_folder,
     measure_steps,
 )
-from ..modal import StepByStep
 from .model import OnSkin, skin_of, warn_if_overridden
+from .shared import StepByStep
 
 Colour = tuple[float, float, float]
 # Cycles has no albedo of 0 to measure.

@@ -23,7 +23,7 @@ from ...core.curvature.creases import NO_CREASE
 from ...core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
 from ...core.curvature.field import Options
 from ...core.errors import CdrfError
-from ..modal import StepByStep
+from .shared import StepByStep
 
 # Meshes up to this size are done in under half a second; above it a progress bar comes up.
 MODAL_FROM_VERTICES = 15_000

@@ -9,8 +9,8 @@ from typing import Any
 
 import bpy
 
-from ..core.errors import CdrfError
-from ..core.progress import in_words
+from ...core.errors import CdrfError
+from ...core.progress import in_words
 
 
 class StepByStep(bpy.types.Operator):
