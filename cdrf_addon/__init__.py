@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """CDRF: curvature-dependent translucency for EEVEE (Kubo, Dobashi and Morishima 2011).
 
-`cdrf_addon.core` is usable without Blender, so nothing here imports bpy before it registers.
+`cdrf_addon.core` works without Blender, so importing this package does not import bpy.
 """
 
 from __future__ import annotations
@@ -10,14 +10,12 @@ from types import ModuleType
 
 
 def _modules() -> tuple[ModuleType, ...]:
-    from .ui import light_updates as auto_update
-    from .ui import panels
-    from .ui import properties as props
-    from .ui.operators import measure as ops_measure
-    from .ui.operators import model as ops_model
-    from .ui.operators import translucency as ops
+    """Return the modules to register, in order: panels show properties and operators."""
+    from .ui import handlers, panels, preferences, properties
+    from .ui.operators import display, measure, model, translucency
 
-    return props, ops, ops_model, ops_measure, panels, auto_update
+    operators = translucency, display, model, measure
+    return properties, *operators, handlers, panels, preferences
 
 
 def register() -> None:
@@ -27,6 +25,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Undo `register` in the reverse order."""
+    """Undo `register`, in reverse order."""
     for module in reversed(_modules()):
         module.unregister()

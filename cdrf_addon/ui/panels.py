@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel: in the 3D View's sidebar (tab CDRF) and in the material's properties."""
+"""The panels: in the 3D View's sidebar (tab CDRF) and in the material's properties."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..blender import state
 from ..blender.display import curvature as display
 from ..blender.material import install as materials
 from ..blender.material import model as reflectance_models
-from ..blender.material import specular as gloss
+from ..blender.material import specular
 from ..blender.shader.variant import stamped_variant
 from ..blender.shader.wired import wired_lights
 from ..blender.world.stamps import stamped_world
@@ -35,10 +35,10 @@ def _characters(context: bpy.types.Context) -> int:
     return int((context.region.width - 60.0 * scale) / (7.0 * scale))
 
 
-def draw_skin(
+def draw_surface(
     layout: bpy.types.UILayout, context: bpy.types.Context, material: bpy.types.Material
 ) -> None:
-    """Draw the controls of a translucent material."""
+    """Draw how the light scatters, the colour and the shadows of a translucent material."""
     node = materials.cdrf_node(material)
     assert node is not None
     column = layout.column()
@@ -48,7 +48,7 @@ def draw_skin(
     if node.inputs[ids.SIGMA0].is_linked:
         column.label(text="Scatter Distance comes from a node")
     else:
-        # The socket itself, so that I keyframes it and a file without the extension plays it.
+        # The socket itself, so that the key I keyframes it, and a file works without the extension.
         column.prop(node.inputs[ids.SIGMA0], "default_value", text="Scatter \u03c3\u2080")
     column.prop(material.cdrf, "sigma0_ratio", text="Ratio R, G, B")
     if not node.inputs[ids.BASE_COLOR].is_linked:
@@ -71,9 +71,9 @@ def draw_skin(
 
 
 def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None:
-    """Draw the choice of model, and of scatter distances that others have measured."""
+    """Draw the choice of model, and the buttons that find a scatter distance."""
     kind = reflectance_models.kind_of_model(material)
-    name = next(item[1] for item in MODEL_ITEMS if item[0] == kind)
+    name = next(label for key, label, *_ in MODEL_ITEMS if key == kind)
     row = layout.row(align=True)
     row.operator_menu_enum("cdrf.set_model", "model", text=name, icon="SHADING_TEXTURE")
     row.operator_menu_enum("cdrf.preset", "preset", text="Preset", icon="PRESET")
@@ -90,9 +90,9 @@ def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None
             column.label(text=problem, icon="ERROR")
 
 
-def draw_ambient(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
-    """Draw what of the world's light reaches the material, and its occlusion."""
-    node = materials.cdrf_node(skin)
+def draw_ambient(layout: bpy.types.UILayout, material: bpy.types.Material) -> None:
+    """Draw what is followed of the world's light, and the switch of its occlusion."""
+    node = materials.cdrf_node(material)
     assert node is not None
     light = stamped_world(node.node_tree)
     if light is None:
@@ -108,26 +108,28 @@ def draw_ambient(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
         text += ", with a sun"
     layout.label(text=text, icon="WORLD")
     row = layout.row(align=True)
-    row.enabled = skin.is_editable
-    row.prop(skin.cdrf, "ambient_occlusion", toggle=True)
+    row.enabled = material.is_editable
+    row.prop(material.cdrf, "ambient_occlusion", toggle=True)
     if ids.OCCLUSION_DISTANCE in node.inputs:
         row.prop(node.inputs[ids.OCCLUSION_DISTANCE], "default_value", text="Distance")
 
 
-def draw_gloss(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
-    """Draw the switch of the gloss, where the material has any to keep."""
-    if gloss.find_principled(skin) is not None:
+def draw_specular(layout: bpy.types.UILayout, material: bpy.types.Material) -> None:
+    """Draw the switch of the specular part, where the material has one to keep."""
+    if specular.find_principled(material) is not None:
         row = layout.row()
-        row.enabled = skin.is_editable
-        row.prop(skin.cdrf, "gloss", text="Gloss of Principled BSDF", toggle=True, icon="MATERIAL")
+        row.enabled = material.is_editable
+        row.prop(
+            material.cdrf, "gloss", text="Gloss of Principled BSDF", toggle=True, icon="MATERIAL"
+        )
 
 
 def draw_display(
-    layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.types.Material
+    layout: bpy.types.UILayout, context: bpy.types.Context, material: bpy.types.Material
 ) -> None:
-    """Draw the buttons that show curvature in colours, and the one that removes translucency."""
+    """Draw the buttons that show the curvature in colours, and the one to remove translucency."""
     row = layout.row(align=True)
-    shown = display.shows_curvature(skin)
+    shown = display.shows_curvature(material)
     button = row.operator(
         "cdrf.show_curvature",
         text="Show Skin" if shown else "Show Curvature",
@@ -149,10 +151,10 @@ def draw_display(
 
 
 def draw_state(
-    layout: bpy.types.UILayout, context: bpy.types.Context, item: bpy.types.Object
+    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object
 ) -> None:
-    """Draw what is known of the object's curvature, and what is out of date."""
-    known = item.data.cdrf
+    """Draw the object's curvature, and what is out of date."""
+    known = obj.data.cdrf
     width = _characters(context)
     box = layout.box().column(align=True)
     if known.kind == FLAT:
@@ -169,7 +171,7 @@ def draw_state(
     for line in known.warnings.splitlines()[:_MOST_LINES]:
         _wrapped(box, line, width, "INFO")
     playing = bool(context.screen and context.screen.is_animation_playing)
-    reasons = state.reasons_to_update(item, context.scene, context.view_layer, playing=playing)
+    reasons = state.reasons_to_update(obj, context.scene, context.view_layer, playing=playing)
     if reasons:
         due = layout.box().column(align=True)
         due.alert = True
@@ -189,34 +191,34 @@ class _View3D:
 
 
 class CDRF_PT_main(_View3D, bpy.types.Panel):
-    """The one button, and the state of the active object."""
+    """Make Translucent, and the material and the curvature of the active object."""
 
     bl_label = "Translucency"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        item = context.active_object
-        skin = materials.active_skin(item)
+        obj = context.active_object
+        material = materials.active_skin(obj)
         row = layout.row()
         row.scale_y = 1.5
         row.operator("cdrf.setup", icon="SHADING_RENDERED")
         if context.mode != "OBJECT":
             layout.label(text="Leave this mode to continue (Tab)", icon="INFO")
-        elif item is None or item.type != "MESH":
+        elif obj is None or obj.type != "MESH":
             layout.label(text="Select a mesh object", icon="INFO")
-        if skin is None:
+        if material is None:
             return
         engine = context.scene.render.engine
         if engine != EEVEE:
             layout.label(text="Shown by EEVEE only", icon="INFO")
             layout.prop(context.scene.render, "engine", text="Render Engine")
-        layout.label(text=skin.name, icon="MATERIAL")
-        draw_skin(layout, context, skin)
-        draw_model(layout, skin)
-        draw_ambient(layout, skin)
-        draw_gloss(layout, skin)
-        draw_display(layout, context, skin)
-        draw_state(layout, context, item)
+        layout.label(text=material.name, icon="MATERIAL")
+        draw_surface(layout, context, material)
+        draw_model(layout, material)
+        draw_ambient(layout, material)
+        draw_specular(layout, material)
+        draw_display(layout, context, material)
+        draw_state(layout, context, obj)
 
 
 class CDRF_PT_material(bpy.types.Panel):
@@ -239,10 +241,10 @@ class CDRF_PT_material(bpy.types.Panel):
             button = layout.operator("cdrf.setup", icon="SHADING_RENDERED")
             button.only_active_slot = button.only_active_object = True
             return
-        draw_skin(layout, context, material)
+        draw_surface(layout, context, material)
         draw_model(layout, material)
         draw_ambient(layout, material)
-        draw_gloss(layout, material)
+        draw_specular(layout, material)
         draw_state(layout, context, context.object)
 
 

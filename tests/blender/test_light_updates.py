@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The preference that updates lights by itself: off, on, undone, and gone."""
+"""The preference that updates lights automatically: off, on, undone, and gone."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from rig import Rig
 
 from cdrf_addon import ids
 from cdrf_addon.blender.material.install import cdrf_node
-from cdrf_addon.ui import light_updates as auto_update
+from cdrf_addon.ui import light_updates, preferences
 
 
-def preferences() -> bpy.types.AddonPreferences:
+def own_preferences() -> bpy.types.AddonPreferences:
     return bpy.context.preferences.addons["cdrf_addon"].preferences
 
 
 @pytest.fixture
 def switch(rig: Rig) -> Iterator[bpy.types.AddonPreferences]:
-    """The preferences; a skin under one sun."""
+    """The preferences, and a translucent ball under one sun."""
     rig.light("SUN", name="Key")
     rig.sphere().name = "Ball"
     bpy.context.view_layer.update()
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
     bpy.ops.ed.undo_push(message="set up")
-    assert not preferences().auto_update, "off until asked for"
-    yield preferences()
-    preferences().auto_update = False
+    assert not own_preferences().auto_update, "off until asked for"
+    yield own_preferences()
+    own_preferences().auto_update = False
 
 
 def wired() -> set[str]:
@@ -38,21 +38,21 @@ def wired() -> set[str]:
 
 
 def pending() -> bool:
-    return bool(bpy.app.timers.is_registered(auto_update._tick))
+    return bool(bpy.app.timers.is_registered(light_updates._tick))
 
 
 def settle() -> None:
     """What the event loop, which a background Blender lacks, would do next."""
     bpy.context.view_layer.update()
     if pending():
-        bpy.app.timers.unregister(auto_update._tick)
-        assert auto_update._tick() is None
+        bpy.app.timers.unregister(light_updates._tick)
+        assert light_updates._tick() is None
 
 
 def watching() -> int:
     names = ("depsgraph_update_post", "load_post", "undo_post", "redo_post")
     return sum(
-        handler.__module__ == auto_update.__name__
+        handler.__module__ == light_updates.__name__
         for name in names
         for handler in getattr(bpy.app.handlers, name)
     )
@@ -112,11 +112,11 @@ def test_it_waits_for_object_mode_and_for_renders(rig: Rig, switch, monkeypatch)
     rig.light("POINT")
     bpy.context.view_layer.objects.active = bpy.data.objects["Ball"]
     bpy.ops.object.mode_set(mode="EDIT")
-    assert pending() and auto_update._tick() == auto_update.WAIT_SECONDS
+    assert pending() and light_updates._tick() == light_updates.WAIT_SECONDS
     bpy.ops.object.mode_set(mode="OBJECT")
     with monkeypatch.context() as patch:
-        patch.setattr(auto_update, "_rendering", lambda: True)
-        assert auto_update._tick() == auto_update.WAIT_SECONDS
+        patch.setattr(light_updates, "_rendering", lambda: True)
+        assert light_updates._tick() == light_updates.WAIT_SECONDS
         assert wired() == {"SUN"}
     settle()
     assert wired() == {"SUN", "POINT"}
@@ -127,11 +127,11 @@ def test_unregistering_leaves_nothing_behind(rig: Rig, switch) -> None:
     rig.light("POINT")
     bpy.context.view_layer.update()
     assert pending() and watching() == 4
-    auto_update.unregister()
+    preferences.unregister()
     try:
         assert not pending() and watching() == 0
     finally:
-        auto_update.register()
+        preferences.register()
     assert watching() == 4, "the preference was on"
 
 
@@ -143,13 +143,13 @@ def test_a_light_that_is_only_moved_is_not_compared(
     switch.auto_update = True
     settle()
     listed: list[str] = []
-    signature = auto_update._signature
+    signature = light_updates._signature
 
     def note(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> tuple[object, ...]:
         listed.append(scene.name)
         return signature(scene, layer)
 
-    monkeypatch.setattr(auto_update, "_signature", note)
+    monkeypatch.setattr(light_updates, "_signature", note)
     for _ in range(20):
         lamp.location.x += 0.1
         bpy.context.view_layer.update()

@@ -9,8 +9,6 @@ import bpy
 import pytest
 
 HANDLERS = ("depsgraph_update_post", "load_post", "undo_post", "redo_post")
-
-
 OPERATORS = ["fit", "measure", "preset", "read_shader", "remove", "save_curvature", "set_model"]
 OPERATORS += ["setup", "show_curvature", "update"]
 

@@ -31,7 +31,7 @@ CORE = (GENERAL, "core/curvature", "core/reflectance", "core/scattering", "core/
 LEAVES = "blender/{units,pictures,instances}"
 BELOW = (BASE, *CORE, LEAVES)
 SCENE = ("blender/mesh", "blender/nodes", "blender/lights", "blender/world")
-JOB = "blender/{selection,mesh_work,report,setup,state}"
+JOB = "blender/{selection,mesh_work,report,setup,removal,state}"
 BLENDER = (*SCENE, "blender/shader", "blender/material", "blender/display", JOB)
 
 ROOMS: dict[str, Room] = {

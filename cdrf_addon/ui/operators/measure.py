@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that path-trace spheres of a material: Measure makes a table of them, Fit fits sigma0.
 
-The path tracing runs in a Blender of its own (measure.py), so the window stays alive and nothing is
-changed before the end. What was measured once is kept on disk.
+The path tracing runs in a Blender of its own (measuring/process.py), so the window stays alive and
+nothing is changed before the end. Measurements are kept on disk and used again.
 """
 
 from __future__ import annotations
@@ -41,30 +41,30 @@ from ...measuring.process import (
     cache_folder,
     measure_steps,
 )
-from .model import OnSkin, skin_of, warn_if_overridden
-from .shared import StepByStep
+from .shared import OnTranslucentMaterial, StepByStep, refuse, warn_if_overridden
 
 Colour = tuple[float, float, float]
-# Cycles has no albedo of 0 to measure.
+# Cycles cannot measure an albedo of 0.
 LEAST_ALBEDO = 1e-3
-# Principal curvatures of a sphere are equal; an open cylinder's are not.
+# Greatest difference of the principal curvatures of a sphere, relative to its curvedness. They
+# differ on a cylinder, whose curvature is constant, too.
 ROUND = 1e-2
 MOST_RADIUS = 1e6
-# Shown in the picture where nothing is known of the object.
+# Scatter radius times curvature that the picture shows of a flat object.
 MIDDLE_SCALE = 0.25
 QUALITY_ITEMS = (
-    ("preview", "Preview", "A quarter of the default's time; shows which way it goes"),
+    ("preview", "Preview", "A quarter of the default's time; for a first look"),
     ("default", "Default", "About a minute on two cores"),
     ("fine", "Fine", "Half the noise of the default, in four times its time"),
 )
 
 
-class _PathTraced(OnSkin, StepByStep):
+class _PathTraced(OnTranslucentMaterial, StepByStep):
     """Measures the active material behind a progress bar; never registered itself."""
 
-    # The path tracing is elsewhere: the artist goes on working.
+    # Another process path-traces: the artist goes on working.
     WHILE_WAITING = "PASS_THROUGH"
-    _skin: int
+    _material_uid: int
     _kappa: float
     _round: bool
     SETTINGS: tuple[str, ...] = ("albedo", "radius", "quality", "seed")
@@ -109,13 +109,13 @@ class _PathTraced(OnSkin, StepByStep):
     method: StringProperty(default=RANDOM_WALK, options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        skin = skin_of(context)
-        self._fill_in(skin)
+        material = self.material(context)
+        self._fill_in(material)
         return context.window_manager.invoke_props_dialog(self, width=360)
 
-    def _fill_in(self, skin: bpy.types.Material) -> None:
-        """Take from the material what nobody has set."""
-        own = own_scattering(skin)
+    def _fill_in(self, material: bpy.types.Material) -> None:
+        """Take the properties that nobody has set from the material."""
+        own = own_scattering(material)
         for name in ("albedo", "radius", "method"):
             if not self.properties.is_property_set(name):
                 setattr(self, name, getattr(own, name))
@@ -127,9 +127,9 @@ class _PathTraced(OnSkin, StepByStep):
             layout.prop(self, name)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        skin = skin_of(context)
-        self._fill_in(skin)
-        self._skin = skin.session_uid
+        material = self.material(context)
+        self._fill_in(material)
+        self._material_uid = material.session_uid
         known = context.object.data.cdrf
         self._kappa = known.median
         kappa, k1, k2, _ = known.mean_values
@@ -139,43 +139,48 @@ class _PathTraced(OnSkin, StepByStep):
             if context.window is None or bpy.app.background:
                 return self.finish(context, run_steps(self._steps))
         except CdrfError as error:
-            return self.refuse(error)
+            return refuse(self, error)
         return self.begin(context)
 
     def _request(self) -> Request:
         if not 0.0 < max(self.radius) <= MOST_RADIUS:
             raise ParameterError(
-                f"A scatter radius above 0, up to {MOST_RADIUS:g}, is wanted: enter one."
+                f"The scatter radius must be above 0, up to {MOST_RADIUS:g}, in at least one "
+                "colour: enter one."
             )
         red, green, blue = (max(float(part), LEAST_ALBEDO) for part in self.albedo)
         return Request((red, green, blue), self.quality, self.seed, method=self.method)
 
-    def _material(self) -> bpy.types.Material:
-        """Return the material the work began with, which may have gone meanwhile."""
-        for skin in bpy.data.materials:
-            if skin.session_uid == self._skin and cdrf_node(skin) is not None:
-                return skin
+    def _material_of_job(self) -> bpy.types.Material:
+        """Return the material that the work began with.
+
+        Raises:
+            SceneError: It was deleted or made opaque meanwhile.
+        """
+        for material in bpy.data.materials:
+            if material.session_uid == self._material_uid and cdrf_node(material) is not None:
+                return material
         raise SceneError(
-            "The material is no longer there or no longer translucent; the measurement is kept, "
-            "so the next one of the same material is done at once."
+            "The material was deleted or is no longer translucent. The measurement is kept: press "
+            "the button again on a material with the same settings to use it at once."
         )
 
     def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
-        """Path-trace, then work out what this operator is after."""
+        """Path-trace, then compute the result that `finish` writes."""
         raise NotImplementedError
 
 
-def own_scattering(skin: bpy.types.Material) -> Scattering:
-    """Read a material's scattering from its nodes, else work it out from its scatter distance."""
-    found = read_scattering(skin)
+def own_scattering(material: bpy.types.Material) -> Scattering:
+    """Read a material's scattering from its nodes, else compute it from its scatter distance."""
+    found = read_scattering(material)
     if found is not None:
-        # Burley's profile is no path tracing: what it stands for is a random walk.
+        # Burley's profile is not path-traced; it approximates a random walk.
         return replace(found, method=RANDOM_WALK) if found.method == BURLEY else found
-    node = cdrf_node(skin)
+    node = cdrf_node(material)
     assert node is not None
     red, green, blue, _ = node.inputs[ids.BASE_COLOR].default_value
     albedo = (red, green, blue)
-    sigma0 = reflectance_models.channel_sigma0(skin)
+    sigma0 = reflectance_models.channel_sigma0(material)
     factors = sigma0_per_radius(albedo, walk_method(RANDOM_WALK))
     radius = [float(own / factor) for own, factor in zip(sigma0, factors, strict=True)]
     return Scattering(albedo, (radius[0], radius[1], radius[2]), RANDOM_WALK, 1.0)
@@ -185,15 +190,24 @@ def _smooth_and_fit(
     spheres: SphereMeasurement, radius: Colour
 ) -> tuple[MeasuredModel, MaterialFit]:
     fitted = fit_material(spheres)
-    # The slope that the model would otherwise fit once more.
+    # The model would otherwise fit this slope once more.
     widest = fitted.channels[int(np.argmax(radius))]
     return MeasuredModel(spheres, radius, widest.sigma0["sphere"]), fitted
 
 
-def _aside(
+def _in_thread(
     call: Callable[[], Any], part: float, what: str
 ) -> Generator[tuple[float, str], None, Any]:
-    """Do a second or two of arithmetic in a thread, so that the window stays alive."""
+    """Compute for a second or two in a thread, so that the window stays alive.
+
+    Args:
+        call: What to compute.
+        part: Progress to show meanwhile, from 0 to 1.
+        what: What is being done.
+
+    Returns:
+        What the call returned.
+    """
     with ThreadPoolExecutor(1) as pool:
         running = pool.submit(call)
         while not running.done():
@@ -233,22 +247,22 @@ class CDRF_OT_measure(_PathTraced):
     SETTINGS = ("albedo", "radius", "quality", "seed", "energy")
 
     def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
-        kept = self.energy == "KEEP" or (self.energy == "AUTO" and not self._round)
-        # What is to be seen from anywhere is measured from everywhere.
-        found = yield from measure_steps(replace(request, all_views=kept), cache_folder())
-        make = partial(measured_model, found, tuple(self.radius), keep_energy=kept)
-        return (yield from _aside(make, 1.0, "Smoothing"))
+        keep_energy = self.energy == "KEEP" or (self.energy == "AUTO" and not self._round)
+        # The energy of all views is needed to keep it.
+        found = yield from measure_steps(replace(request, all_views=keep_energy), cache_folder())
+        make = partial(measured_model, found, tuple(self.radius), keep_energy=keep_energy)
+        return (yield from _in_thread(make, 1.0, "Smoothing"))
 
     def finish(self, context: bpy.types.Context, found: Any) -> set[str]:
-        skin = self._material()
+        material = self._material_of_job()
         model, sigma0 = found
         table = ensure_table(model)
-        skin.cdrf.measured, skin.cdrf.measured_image = table.key, table.image
-        reflectance_models.set_model(skin, model.key)
-        skin.cdrf.sigma0 = sigma0
-        skin.cdrf.sigma0_ratio = (1.0, 1.0, 1.0)
-        warn_if_overridden(self, skin)
-        self.report({"INFO"}, f"CDRF: '{skin.name}' is shaded as its spheres were path-traced")
+        material.cdrf.measured, material.cdrf.measured_image = table.key, table.image
+        reflectance_models.set_model(material, model.key)
+        material.cdrf.sigma0 = sigma0
+        material.cdrf.sigma0_ratio = (1.0, 1.0, 1.0)
+        warn_if_overridden(self, material)
+        self.report({"INFO"}, f"CDRF: '{material.name}' is shaded as its spheres were path-traced")
         return {"FINISHED"}
 
 
@@ -262,26 +276,30 @@ class CDRF_OT_fit(_PathTraced):
     def _work(self, request: Request) -> Generator[tuple[float, str], None, Any]:
         spheres = yield from measure_steps(request, cache_folder())
         work = partial(_smooth_and_fit, spheres, tuple(self.radius))
-        return (yield from _aside(work, 1.0, "Fitting"))
+        return (yield from _in_thread(work, 1.0, "Fitting"))
 
     def finish(self, context: bpy.types.Context, found: Any) -> set[str]:
-        skin = self._material()
+        material = self._material_of_job()
         model, fitted = found
-        if reflectance_models.has_colour(skin):
-            reflectance_models.set_kind(skin, SPHERE)
-        name = "ring" if reflectance_models.kind_of_model(skin) == RING else "sphere"
-        # Right at the object's middle curvature; that sphere is shown, too.
+        if reflectance_models.has_colour(material):
+            reflectance_models.set_kind(material, SPHERE)
+        name = "ring" if reflectance_models.kind_of_model(material) == RING else "sphere"
+        # Exact at the object's median curvature; the picture shows that sphere.
         sigma0 = sigma0_at(fitted, name, self.radius, self._kappa)
-        reflectance_models.set_channel_sigma0(skin, sigma0)
-        warn_if_overridden(self, skin)
+        reflectance_models.set_channel_sigma0(material, sigma0)
+        warn_if_overridden(self, material)
         for sentence in fitted.sentences():
             self.report({"INFO"}, sentence)
         scale = max(self.radius) * self._kappa or MIDDLE_SCALE
         try:
-            path = picture_path(skin, cache_folder())
+            path = picture_path(material, cache_folder())
             make_picture(model, fitted, scale, path)
         except OSError as error:
-            self.report({"WARNING"}, f"The picture could not be written: {error.strerror}.")
+            self.report(
+                {"WARNING"},
+                f"The picture of the fit could not be written ({error.strerror}): save the file "
+                "in a folder where you may write.",
+            )
             return {"FINISHED"}
         show_picture(context)
         self.report({"INFO"}, f"CDRF: picture of the fit written to {path}")

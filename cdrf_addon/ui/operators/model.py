@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators for a material's model of reflectance and its scatter distance."""
+"""Operators that choose a material's reflectance model and its scatter distance."""
 
 from __future__ import annotations
 
@@ -8,66 +8,42 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ... import ids
 from ...blender.material import model as reflectance_models
-from ...blender.material.install import active_skin, cdrf_node
+from ...blender.material.install import cdrf_node
 from ...blender.material.scattering import read_scattering
 from ...core.errors import CdrfError
 from ...core.reflectance.model import DEFAULT_KIND, MODEL_ITEMS
 from ...core.scattering.presets import PRESETS
+from .shared import OnTranslucentMaterial, refuse, warn_if_overridden
 
-# Blurs of the middle of an object that look like none at all, and like wax throughout.
-OPAQUE, MOLTEN = 0.02, 1.5
-
-
-class OnSkin(bpy.types.Operator):
-    """An operator on the active translucent material; never registered itself."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        skin = active_skin(context.object)
-        if skin is None:
-            cls.poll_message_set("Make the object translucent first")
-            return False
-        if not skin.is_editable:
-            cls.poll_message_set("The material is linked from another file: make it local first")
-            return False
-        return True
+# sigma0 times the median curvature: below, the surface looks opaque; above, lit from all sides.
+LOOKS_OPAQUE, LOOKS_CLEAR = 0.02, 1.5
 
 
-def skin_of(context: bpy.types.Context) -> bpy.types.Material:
-    """Return the material that `OnSkin.poll` found."""
-    skin = active_skin(context.object)
-    assert skin is not None
-    return skin
-
-
-def warn_if_overridden(operator: bpy.types.Operator, skin: bpy.types.Material) -> None:
-    """Say so where a keyframe or a link decides the scatter distance, whatever was set."""
-    what = reflectance_models.overridden(skin)
-    if what:
-        operator.report({"WARNING"}, what)
-
-
-class CDRF_OT_set_model(OnSkin):
+class CDRF_OT_set_model(OnTranslucentMaterial):
     """Choose how the light that spreads under the surface shades it"""
 
     bl_idname = "cdrf.set_model"
     bl_label = "Model"
     bl_options = {"REGISTER", "UNDO"}
 
-    model: EnumProperty(name="Model", items=MODEL_ITEMS, default=DEFAULT_KIND)
+    model: EnumProperty(
+        name="Model",
+        description="How the light that spreads under the surface shades it",
+        items=MODEL_ITEMS,
+        default=DEFAULT_KIND,
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        skin = skin_of(context)
+        material = self.material(context)
         try:
-            reflectance_models.set_kind(skin, self.model)
+            reflectance_models.set_kind(material, self.model)
         except CdrfError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        warn_if_overridden(self, skin)
+            return refuse(self, error)
+        warn_if_overridden(self, material)
         return {"FINISHED"}
 
 
-class CDRF_OT_preset(OnSkin):
+class CDRF_OT_preset(OnTranslucentMaterial):
     """Scatter distance of a real material, in millimetres, for each colour"""
 
     bl_idname = "cdrf.preset"
@@ -76,7 +52,8 @@ class CDRF_OT_preset(OnSkin):
 
     preset: EnumProperty(
         name="Material",
-        items=[(key, item.label, item.description) for key, item in PRESETS.items()],
+        description="The real material to scatter like",
+        items=[(key, preset.label, preset.description) for key, preset in PRESETS.items()],
     )
     real_height: FloatProperty(
         name="Real Height",
@@ -91,12 +68,12 @@ class CDRF_OT_preset(OnSkin):
     )
     with_color: BoolProperty(
         name="Color Too",
-        description="Set the base color to the material's, where no texture feeds it",
+        description="Set the base color to the real material's, too, where no texture feeds it",
         default=False,
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        skin = skin_of(context)
+        material = self.material(context)
         preset = PRESETS[self.preset]
         size = 1.0
         if self.real_height > 0.0:
@@ -104,31 +81,36 @@ class CDRF_OT_preset(OnSkin):
             size = (dimensions.z or max(dimensions)) / self.real_height
         metres = reflectance_models.metres_of(context.scene)
         try:
-            reflectance_models.apply_preset(skin, preset, metres, size)
+            reflectance_models.apply_preset(material, preset, metres, size)
         except CdrfError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        node = cdrf_node(skin)
+            return refuse(self, error)
+        node = cdrf_node(material)
         assert node is not None
         if self.with_color and not node.inputs[ids.BASE_COLOR].is_linked:
             node.inputs[ids.BASE_COLOR].default_value = (*preset.albedo, 1.0)
-        self._warn_of_size(context.object, skin.cdrf.sigma0, metres)
-        warn_if_overridden(self, skin)
+        self._warn_of_size(context.object, material.cdrf.sigma0, metres)
+        warn_if_overridden(self, material)
         self.report({"INFO"}, f"CDRF: {preset.label}. {preset.description}")
         return {"FINISHED"}
 
-    def _warn_of_size(self, item: bpy.types.Object, sigma0: float, metres: float) -> None:
-        """Say so where the object is so large or small that the material does not show."""
-        blur = sigma0 * item.data.cdrf.median
-        tall = bpy.utils.units.to_string("METRIC", "LENGTH", item.dimensions.z * metres)
+    def _warn_of_size(self, obj: bpy.types.Object, sigma0: float, metres: float) -> None:
+        """Warn where the object is so large or small that its translucency does not show.
+
+        Args:
+            obj: A translucent object.
+            sigma0: Scatter distance, in world units.
+            metres: Length of a world unit.
+        """
+        blur = sigma0 * obj.data.cdrf.median
+        tall = bpy.utils.units.to_string("METRIC", "LENGTH", obj.dimensions.z * metres)
         advice = "give its Real Height in the panel below the viewport (F9)."
-        if 0.0 < blur < OPAQUE:
+        if 0.0 < blur < LOOKS_OPAQUE:
             self.report({"WARNING"}, f"At {tall} tall this object looks opaque: {advice}")
-        elif blur > MOLTEN:
+        elif blur > LOOKS_CLEAR:
             self.report({"WARNING"}, f"At {tall} tall light passes right through: {advice}")
 
 
-class CDRF_OT_read_shader(OnSkin):
+class CDRF_OT_read_shader(OnTranslucentMaterial):
     """Take the scatter distance from the material's own Principled or Subsurface Scattering node"""
 
     bl_idname = "cdrf.read_shader"
@@ -136,22 +118,21 @@ class CDRF_OT_read_shader(OnSkin):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        skin = skin_of(context)
-        found = read_scattering(skin)
+        material = self.material(context)
+        found = read_scattering(material)
         if found is None:
-            self.report(
-                {"ERROR"},
-                f"Nothing in '{skin.name}' scatters: give its Principled BSDF a Subsurface Weight "
-                "and a Scale, or choose a preset.",
+            return refuse(
+                self,
+                f"Nothing in '{material.name}' scatters: give its Principled BSDF a Subsurface "
+                "Weight and a Scale, or choose a preset.",
             )
-            return {"CANCELLED"}
-        if reflectance_models.has_colour(skin):
-            reflectance_models.set_kind(skin, DEFAULT_KIND)
-        reflectance_models.set_scattering(skin, found)
+        if reflectance_models.has_colour(material):
+            reflectance_models.set_kind(material, DEFAULT_KIND)
+        reflectance_models.set_scattering(material, found)
         for note in found.notes:
             self.report({"WARNING"}, note)
-        warn_if_overridden(self, skin)
-        self.report({"INFO"}, f"CDRF: scatter distance {skin.cdrf.sigma0:.4g} from the nodes")
+        warn_if_overridden(self, material)
+        self.report({"INFO"}, f"CDRF: scatter distance {material.cdrf.sigma0:.4g} from the nodes")
         return {"FINISHED"}
 
 

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The way back: materials become opaque again, and meshes lose what was measured of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+from .. import ids
+from .display import curvature as display
+from .display import viewport
+from .material import linking
+from .material.install import remove, require_editable
+from .material.model import remove_unused
+from .mesh.attributes import remove_curvature
+from .setup import skins_of, skins_on
+
+
+def remove_translucency(
+    context: bpy.types.Context, materials: Iterable[bpy.types.Material]
+) -> None:
+    """Restore materials, remove the curvature that no other material needs, and what is left over.
+
+    Args:
+        context: For the view layer and the window's 3D Views.
+        materials: Translucent materials.
+
+    Raises:
+        SceneError: One is linked from another file; nothing has been changed.
+    """
+    chosen = set(materials)
+    for material in chosen:
+        require_editable(material)
+    users = [obj for obj in bpy.data.objects if chosen & set(skins_on(obj))]
+    for material in chosen:
+        display.show_skin(material)
+        remove(material)
+    _end_unused_display(context)
+    for obj in users:
+        if not skins_on(obj) and obj.is_editable and obj.data.is_editable:
+            _forget_curvature(obj)
+    linking.write_unlit()
+    remove_unused()
+
+
+def _end_unused_display(context: bpy.types.Context) -> None:
+    """Restore the view settings and the viewport if no material shows its curvature any more."""
+    if not any(display.shows_curvature(material) for material in skins_of(context.view_layer)):
+        display.hide(())
+        viewport.restore(context)
+
+
+def _forget_curvature(obj: bpy.types.Object) -> None:
+    """Remove all that was measured of an object and its mesh."""
+    remove_curvature(obj.data)
+    obj.data.cdrf.fingerprint = ""
+    if ids.SCALE_KEY in obj:
+        del obj[ids.SCALE_KEY]
