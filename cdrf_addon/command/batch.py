@@ -28,7 +28,7 @@ from typing import Any
 import bpy
 
 from cdrf_addon import compat, register, unregister
-from cdrf_addon.blender import setup, stage
+from cdrf_addon.blender import pictures, setup, stage, units
 from cdrf_addon.blender.display import curvature as display
 from cdrf_addon.blender.display import legend
 from cdrf_addon.blender.material import model as reflectance_models
@@ -318,7 +318,7 @@ def _adjust(
         record.warnings.append(f"'{material.name}' was showing its curvature; skin is rendered.")
         display.hide([material])
     if options.preset:
-        metres = reflectance_models.metres_of(bpy.context.scene)
+        metres = units.metres_per_unit(bpy.context.scene)
         reflectance_models.apply_preset(material, PRESETS[options.preset], metres, 1.0)
     if options.model:
         reflectance_models.set_kind(material, options.model)
@@ -424,14 +424,14 @@ def _render_all(
             start = time.perf_counter()
             if options.lambert and not (offset and lambert.exists()):
                 with record.stage("render Lambert"), without_scattering():
-                    stage.render_to(lambert)
+                    pictures.render_to(lambert)
             with record.stage("render CDRF"):
                 if sigma is not None:
                     _set_sigma0(dict.fromkeys(own, sigma))
-                stage.render_to(target)
+                pictures.render_to(target)
             if options.lambert:
                 with record.stage("join"):
-                    stage.side_by_side(lambert, target, _joined(target))
+                    pictures.side_by_side(lambert, target, _joined(target))
             seconds = time.perf_counter() - start
             entry = _entry(target, key, seconds, resumed=False)
             entry |= {"frame": frame, "sigma0": sigma}

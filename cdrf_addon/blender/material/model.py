@@ -176,12 +176,6 @@ def set_channel_sigma0(material: bpy.types.Material, sigma0: Sequence[float]) ->
     material.cdrf.sigma0_ratio = [value / largest if largest > 0.0 else 1.0 for value in sigma0]
 
 
-def metres_of(scene: bpy.types.Scene) -> float:
-    """Metres in a unit of the scene; 1 where it has no units, as elsewhere in Blender."""
-    units = scene.unit_settings
-    return 1.0 if units.system == "NONE" else float(units.scale_length)
-
-
 def apply_preset(material: bpy.types.Material, preset: Preset, metres: float, size: float) -> None:
     """Give a material the model and scatter distances of a preset.
 

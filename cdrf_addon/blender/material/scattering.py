@@ -15,6 +15,7 @@ import numpy as np
 
 from ... import ids
 from ...compat import uses_nodes
+from ..pictures import linear_from_srgb, pixels_of
 
 Colour = tuple[float, float, float]
 # Pixels of a picture that are looked at for its mean.
@@ -175,9 +176,7 @@ def _mean(image: bpy.types.Image | None) -> Colour | None:
     width, height = image.size
     if not width * height or not image.channels >= 3:
         return None
-    flat = np.empty(width * height * image.channels, dtype=np.float32)
-    image.pixels.foreach_get(flat)
-    pixels = flat.reshape(-1, image.channels)
+    pixels = pixels_of(image).reshape(-1, image.channels)
     pixels = pixels[:: max(1, len(pixels) // MOST_PIXELS)]
     solid = pixels[:, 3] > 0.0 if image.channels > 3 else np.ones(len(pixels), dtype=bool)
     with np.errstate(over="ignore"):
@@ -186,6 +185,6 @@ def _mean(image: bpy.types.Image | None) -> Colour | None:
         return None
     # Pixels come as they are stored: 8-bit pictures are display-referred.
     if image.colorspace_settings.name == "sRGB":
-        values = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+        values = linear_from_srgb(values)
     red, green, blue = values.mean(axis=0)
     return float(red), float(green), float(blue)

@@ -10,6 +10,7 @@ from ... import ids
 from ...blender.material import model as reflectance_models
 from ...blender.material.install import active_skin, cdrf_node
 from ...blender.material.scattering import read_scattering
+from ...blender.units import length_text, metres_per_unit
 from ...core.errors import CdrfError
 from ...core.reflectance.models import DEFAULT_KIND, MODEL_ITEMS
 from ...core.scattering.presets import PRESETS
@@ -102,7 +103,7 @@ class CDRF_OT_preset(OnSkin):
         if self.real_height > 0.0:
             dimensions = context.object.dimensions
             size = (dimensions.z or max(dimensions)) / self.real_height
-        metres = reflectance_models.metres_of(context.scene)
+        metres = metres_per_unit(context.scene)
         try:
             reflectance_models.apply_preset(skin, preset, metres, size)
         except CdrfError as error:
@@ -120,7 +121,7 @@ class CDRF_OT_preset(OnSkin):
     def _warn_of_size(self, item: bpy.types.Object, sigma0: float, metres: float) -> None:
         """Say so where the object is so large or small that the material does not show."""
         blur = sigma0 * item.data.cdrf.median
-        tall = bpy.utils.units.to_string("METRIC", "LENGTH", item.dimensions.z * metres)
+        tall = length_text(item.dimensions.z * metres)
         advice = "give its Real Height in the panel below the viewport (F9)."
         if 0.0 < blur < OPAQUE:
             self.report({"WARNING"}, f"At {tall} tall this object looks opaque: {advice}")
