@@ -19,7 +19,7 @@ sys.path.insert(0, str(HERE.parent))
 
 import bpy  # noqa: E402  (the checkout must be importable first)
 
-from cdrf_addon.blender.material import specular as gloss  # noqa: E402
+from cdrf_addon.blender.material import specular  # noqa: E402
 from cdrf_addon.blender.nodes import groups  # noqa: E402
 from cdrf_addon.blender.nodes.tables import ensure_table  # noqa: E402
 from cdrf_addon.blender.shader import ambient as ambient_nodes  # noqa: E402
@@ -73,7 +73,11 @@ def build_all() -> list[bpy.types.ShaderNodeTree]:
             (profile(), "RGB"),
         )
     ]
-    built += [ambient_nodes.harmonics_group(), groups.detail_group(), gloss.under_gloss_group()]
+    built += [
+        ambient_nodes.harmonics_group(),
+        groups.detail_group(),
+        specular.under_specular_group(),
+    ]
     built.append(groups.diffused_group())
     built += [shadows.lit_group(translucent=translucent) for translucent in (False, True)]
     built += [groups.display_group(signed=signed) for signed in (False, True)]

@@ -33,6 +33,12 @@ from cdrf_addon.blender.display import curvature as display
 from cdrf_addon.blender.display import legend
 from cdrf_addon.blender.material import model as reflectance_models
 from cdrf_addon.blender.material.install import cdrf_node
+from cdrf_addon.blender.material.scatter_distance import apply_preset
+from cdrf_addon.blender.material.translucent import (
+    linked_translucent_materials,
+    translucent_materials_of,
+    translucent_objects,
+)
 from cdrf_addon.command.console import own_arguments, say
 from cdrf_addon.core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
 from cdrf_addon.core.curvature.field import Options
@@ -278,8 +284,8 @@ def prepare(path: Path, options: argparse.Namespace, record: SceneRecord) -> Non
 
 def _make_translucent(record: SceneRecord, mesh_file: bool, options: argparse.Namespace) -> None:
     layer = bpy.context.view_layer
-    objects = setup.translucent_objects(layer)
-    linked = sorted({m.name for item in layer.objects for m in setup.linked_skins(item)})
+    objects = translucent_objects(layer)
+    linked = sorted({m.name for item in layer.objects for m in linked_translucent_materials(item)})
     if linked:
         record.warnings.append(
             f"Linked, so left as in their own file, --sigma0 or not: {', '.join(linked)}."
@@ -319,7 +325,7 @@ def _adjust(
         display.hide([material])
     if options.preset:
         metres = units.metres_per_unit(bpy.context.scene)
-        reflectance_models.apply_preset(material, PRESETS[options.preset], metres, 1.0)
+        apply_preset(material, PRESETS[options.preset], metres, 1.0)
     if options.model:
         reflectance_models.set_kind(material, options.model)
     if options.ratio:
@@ -451,7 +457,7 @@ def _render_curvature(
 ) -> None:
     """Render the first frame's curvature, at the first sigma0 of the command line."""
     start = time.perf_counter()
-    skins = setup.skins_of(bpy.context.view_layer)
+    skins = translucent_materials_of(bpy.context.view_layer)
     if not skins:
         record.warnings.append("Nothing here has a curvature to show.")
         return

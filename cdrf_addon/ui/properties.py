@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Properties on materials and meshes. What renders lives in node sockets; these show it."""
+"""Properties on materials and meshes.
+
+What renders is in the node of a material; `blender/material/settings.py` reads and writes it.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import math
 
 import bpy
 from bpy.props import (
@@ -17,11 +19,9 @@ from bpy.props import (
     StringProperty,
 )
 
-from .. import ids
-from ..blender.material import model as reflectance_models
-from ..blender.material import specular as gloss
-from ..blender.material.install import cdrf_node
-from ..blender.shader.group import stamped_variant
+from ..blender.material import settings
+from ..blender.material.model import kind_of_model, set_kind
+from ..blender.material.variant import refresh_shadows
 from ..blender.shader.shadows import AUTO, SHADOW_ITEMS
 from ..core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
 from ..core.curvature.mesh import NO_CREASE
@@ -29,92 +29,59 @@ from ..core.curvature.summary import CONSTANT, FLAT, VARYING
 from ..core.errors import CdrfError
 from ..core.reflectance.models import MODEL_ITEMS, PROFILE, RING, SKIN_PROFILE, SPHERE
 
-UNSET = -1.0
-SIGMA0_MAX = 1e6
-RATIO_MAX = 1e3
-
-
-def _clean(value: float, high: float) -> float:
-    return min(max(value, 0.0), high) if math.isfinite(value) else (high if value > 0.0 else 0.0)
-
 
 def _get_sigma0(self: CdrfMaterial) -> float:
-    node = cdrf_node(self.id_data)
-    if node is not None:
-        return float(node.inputs[ids.SIGMA0].default_value)
-    return max(self.chosen_sigma0, 0.0)
+    return settings.sigma0(self.id_data)
 
 
 def _set_sigma0(self: CdrfMaterial, value: float) -> None:
-    self.chosen_sigma0 = _clean(value, SIGMA0_MAX)
-    node = cdrf_node(self.id_data)
-    if node is not None:
-        node.inputs[ids.SIGMA0].default_value = self.chosen_sigma0
+    settings.set_sigma0(self.id_data, value)
 
 
 def _get_ratio(self: CdrfMaterial) -> tuple[float, ...]:
-    node = cdrf_node(self.id_data)
-    source = node.inputs[ids.SIGMA0_RATIO].default_value if node else self.chosen_ratio
-    return tuple(source)
+    return settings.sigma0_ratio(self.id_data)
 
 
 def _set_ratio(self: CdrfMaterial, value: tuple[float, ...]) -> None:
-    ratio = tuple(_clean(factor, RATIO_MAX) for factor in value)
-    self.chosen_ratio = ratio
-    node = cdrf_node(self.id_data)
-    if node is None:
-        return
-    node.inputs[ids.SIGMA0_RATIO].default_value = ratio
-    # As many look-ups as there are different sigma0, no more.
-    reflectance_models.change_variant(self.id_data, ratio=ratio)
+    settings.set_sigma0_ratio(self.id_data, value)
 
 
 def _get_model(self: CdrfMaterial) -> int:
-    kinds = [item[0] for item in MODEL_ITEMS]
-    return kinds.index(reflectance_models.kind_of_model(self.id_data))
+    kinds = [kind for kind, *_ in MODEL_ITEMS]
+    return kinds.index(kind_of_model(self.id_data))
 
 
 def _set_model(self: CdrfMaterial, value: int) -> None:
     # A setter cannot report: what it cannot do it leaves. The operator cdrf.set_model says why.
     with contextlib.suppress(CdrfError):
-        reflectance_models.set_kind(self.id_data, MODEL_ITEMS[value][0])
+        set_kind(self.id_data, MODEL_ITEMS[value][0])
 
 
 def _profile_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
-    if reflectance_models.kind_of_model(self.id_data) == PROFILE:
+    if kind_of_model(self.id_data) == PROFILE:
         with contextlib.suppress(CdrfError):
-            reflectance_models.set_kind(self.id_data, PROFILE)
+            set_kind(self.id_data, PROFILE)
 
 
 def _get_occlusion(self: CdrfMaterial) -> bool:
-    node = cdrf_node(self.id_data)
-    return stamped_variant(node.node_tree).occluded if node else self.chosen_occlusion
+    return settings.is_occluded(self.id_data)
 
 
 def _set_occlusion(self: CdrfMaterial, value: bool) -> None:
-    self.chosen_occlusion = value
     with contextlib.suppress(CdrfError):
-        reflectance_models.change_variant(self.id_data, occluded=value)
+        settings.set_occluded(self.id_data, value)
 
 
-def _get_gloss(self: CdrfMaterial) -> bool:
-    if cdrf_node(self.id_data) is None:
-        return self.wants_gloss()
-    return gloss.has_gloss(self.id_data)
+def _get_specular(self: CdrfMaterial) -> bool:
+    return settings.is_specular(self.id_data)
 
 
-def _set_gloss(self: CdrfMaterial, value: bool) -> None:
-    self.chosen_gloss = int(value)
-    if cdrf_node(self.id_data) is None or not self.id_data.is_editable:
-        return
-    if value:
-        gloss.add_gloss(self.id_data)
-    else:
-        gloss.remove_gloss(self.id_data)
+def _set_specular(self: CdrfMaterial, value: bool) -> None:
+    settings.set_specular(self.id_data, value)
 
 
 def _shadows_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
-    reflectance_models.refresh_shadows(self.id_data)
+    refresh_shadows(self.id_data)
 
 
 class CdrfMaterial(bpy.types.PropertyGroup):
@@ -128,7 +95,7 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         ),
         subtype="DISTANCE",
         min=0.0,
-        max=SIGMA0_MAX,
+        max=settings.SIGMA0_MAX,
         soft_max=1.0,
         step=0.1,
         precision=4,
@@ -145,7 +112,7 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         size=3,
         default=(1.0, 1.0, 1.0),
         min=0.0,
-        max=RATIO_MAX,
+        max=settings.RATIO_MAX,
         soft_max=1.0,
         step=1,
         precision=3,
@@ -188,8 +155,8 @@ class CdrfMaterial(bpy.types.PropertyGroup):
             "Keep the specular half of the material's Principled BSDF (roughness, coat, sheen, "
             "emission) on top of the translucent surface"
         ),
-        get=_get_gloss,
-        set=_set_gloss,
+        get=_get_specular,
+        set=_set_specular,
         options=set(),
     )
     chosen_gloss: IntProperty(default=-1, options={"HIDDEN"})
@@ -204,10 +171,6 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         options=set(),
     )
     chosen_occlusion: BoolProperty(default=False, options={"HIDDEN"})
-
-    def wants_gloss(self) -> bool:
-        """What was chosen; without a choice, whether the material has gloss to keep."""
-        return gloss.suits(self.id_data) if self.chosen_gloss < 0 else bool(self.chosen_gloss)
 
     shadows: EnumProperty(
         name="Shadows",
@@ -234,7 +197,7 @@ class CdrfMaterial(bpy.types.PropertyGroup):
     measured: StringProperty(options={"HIDDEN"})
     # Blender deletes pictures that nobody uses; this one is wanted again.
     measured_image: PointerProperty(type=bpy.types.Image, options={"HIDDEN"})
-    chosen_sigma0: FloatProperty(default=UNSET, options={"HIDDEN"})
+    chosen_sigma0: FloatProperty(default=settings.UNSET, options={"HIDDEN"})
     chosen_ratio: FloatVectorProperty(size=3, default=(1.0, 1.0, 1.0), options={"HIDDEN"})
 
 

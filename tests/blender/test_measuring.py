@@ -12,7 +12,8 @@ import pytest
 from rig import Rig, cdrf_node
 
 from cdrf_addon import ids
-from cdrf_addon.blender.material import model as reflectance_models
+from cdrf_addon.blender.material.model import ensure_chosen, profile_problem
+from cdrf_addon.blender.material.scatter_distance import channel_sigma0, overridden
 from cdrf_addon.blender.nodes.tables import ensure_table, find_table
 from cdrf_addon.compat import ensure_node_tree
 from cdrf_addon.core.measured.measurement import SphereMeasurement
@@ -72,7 +73,7 @@ def skin(rig: Rig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> bpy.types
 
 
 def own_sigma0(material: bpy.types.Material) -> np.ndarray:
-    return np.array(reflectance_models.channel_sigma0(material))
+    return np.array(channel_sigma0(material))
 
 
 def test_a_script_gets_the_materials_own_scattering(skin: bpy.types.Material) -> None:
@@ -130,7 +131,7 @@ def test_a_deleted_measured_table_is_said(skin: bpy.types.Material) -> None:
     table = find_table(skin.cdrf.measured)
     assert table is not None
     bpy.data.images.remove(table.image)
-    key, sentence = reflectance_models.ensure_chosen(skin)
+    key, sentence = ensure_chosen(skin)
     assert key == SPHERE and "Measure again" in sentence
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     assert skin.cdrf.model == SPHERE
@@ -147,18 +148,18 @@ def test_a_deleted_profile_with_unreadable_text_is_a_way_out_too(skin: bpy.types
     assert skin.cdrf.model == SPHERE
     assert bpy.ops.cdrf.preset(preset="SKIN_LAYERED") == {"FINISHED"}
     assert skin.cdrf.model == "PROFILE"
-    assert reflectance_models.profile_problem(skin) == ""
+    assert profile_problem(skin) == ""
 
 
 def test_what_moves_sigma0_is_named(skin: bpy.types.Material) -> None:
-    assert reflectance_models.overridden(skin) == ""
+    assert overridden(skin) == ""
     socket = cdrf_node(bpy.context.object).inputs[ids.SIGMA0]
     socket.default_value = 0.1
     socket.keyframe_insert("default_value", frame=1)
-    assert "animated" in reflectance_models.overridden(skin)
+    assert "animated" in overridden(skin)
     value = skin.node_tree.nodes.new("ShaderNodeValue")
     skin.node_tree.links.new(value.outputs[0], socket)
-    assert "connected" in reflectance_models.overridden(skin)
+    assert "connected" in overridden(skin)
 
 
 def test_presets_leave_the_papers_model(skin: bpy.types.Material) -> None:

@@ -512,7 +512,7 @@ def test_curvature_display_follows_an_update_and_goes_away(rig: Rig) -> None:
 
 
 def test_deleted_parts_come_back_at_the_next_update(rig: Rig) -> None:
-    from cdrf_addon.blender.material.install import skin_output
+    from cdrf_addon.blender.material.install import cdrf_output
     from cdrf_addon.blender.nodes.tree import is_intact
     from cdrf_addon.blender.state import reasons_to_update
 
@@ -525,7 +525,7 @@ def test_deleted_parts_come_back_at_the_next_update(rig: Rig) -> None:
     def whole() -> bool:
         reasons = reasons_to_update(item, rig.scene, bpy.context.view_layer)
         output = material.node_tree.get_output_node("EEVEE")
-        linked = output == skin_output(material) and output.inputs["Surface"].is_linked
+        linked = output == cdrf_output(material) and output.inputs["Surface"].is_linked
         return not reasons and linked and is_intact(cdrf_node(item).node_tree)
 
     assert whole()
@@ -537,11 +537,11 @@ def test_deleted_parts_come_back_at_the_next_update(rig: Rig) -> None:
     assert not whole()
     bpy.ops.cdrf.update()
     assert whole()
-    material.node_tree.nodes.remove(skin_output(material))
+    material.node_tree.nodes.remove(cdrf_output(material))
     assert not whole()
     bpy.ops.cdrf.update()
     assert whole()
-    output = skin_output(material)
+    output = cdrf_output(material)
     assert output is not None
     output.name = "Renamed"
     bpy.ops.cdrf.remove()
