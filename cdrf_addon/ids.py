@@ -11,8 +11,8 @@ DIFFUSED_ATTRIBUTE: Final = "cdrf_diffused"
 FILLED_ATTRIBUTE: Final = "cdrf_filled"
 """FLOAT point attribute: 1 where no fit was possible; only on meshes that have such vertices."""
 LENGTH_ATTRIBUTE: Final = "cdrf_length"
-"""FLOAT point attribute: the shortest of those lengths, in world units. Not a custom property, which
-many modifiers drop."""
+"""FLOAT point attribute: the shortest of those lengths, in world units. Not a custom property,
+which many modifiers drop."""
 
 # --- node groups and images: all start with CDRF ------------------------------------------------
 PREFIX: Final = "CDRF"

@@ -193,7 +193,7 @@ def _node_reasons(material: bpy.types.Material) -> list[str]:
     if cdrf_output(material) is None:
         reasons.append("The CDRF Material Output was deleted.")
     if specular.is_outdated(material):
-        reasons.append("The Principled node was changed: its gloss is that of before.")
+        reasons.append("The Principled BSDF was changed; the gloss is still the former one.")
     return reasons
 
 

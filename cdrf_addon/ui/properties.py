@@ -122,7 +122,7 @@ class CdrfMaterial(bpy.types.PropertyGroup):
     )
     model: EnumProperty(
         name="Model",
-        description="How the light that spreads under the surface shades it",
+        description="How light that spreads under the surface shades it",
         items=MODEL_ITEMS,
         get=_get_model,
         set=_set_model,
@@ -131,8 +131,8 @@ class CdrfMaterial(bpy.types.PropertyGroup):
     profile: StringProperty(
         name="Profile",
         description=(
-            "Gaussians of the diffusion profile, parted by semicolons. Each is four numbers: its "
-            "width in any unit, then its part of red, green and blue"
+            "Gaussians of the diffusion profile, separated by semicolons. Each is four numbers: "
+            "its width in any unit, then its part of red, green and blue"
         ),
         default=SKIN_PROFILE.to_text(),
         update=_profile_changed,
@@ -159,19 +159,16 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         set=_set_specular,
         options=set(),
     )
-    chosen_gloss: IntProperty(default=-1, options={"HIDDEN"})
     ambient_occlusion: BoolProperty(
         name="Ambient Occlusion",
         description=(
-            "What is near takes away from the world's light: darker nostrils, ears and collars. "
-            "Found in what is on screen, so it costs time per pixel. Lights are not affected"
+            "Nearby surfaces block the world's light: darker nostrils, ears and collars. Only "
+            "what is on screen counts, and it costs time per pixel. Lights are not affected"
         ),
         get=_get_occlusion,
         set=_set_occlusion,
         options=set(),
     )
-    chosen_occlusion: BoolProperty(default=False, options={"HIDDEN"})
-
     shadows: EnumProperty(
         name="Shadows",
         description=(
@@ -193,12 +190,15 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         update=_shadows_changed,
         options=set(),
     )
+    # What was chosen, for as long as the material is not translucent.
     chosen_model: StringProperty(options={"HIDDEN"})
-    measured: StringProperty(options={"HIDDEN"})
-    # Blender deletes pictures that nobody uses; this one is wanted again.
-    measured_image: PointerProperty(type=bpy.types.Image, options={"HIDDEN"})
     chosen_sigma0: FloatProperty(default=settings.UNSET, options={"HIDDEN"})
     chosen_ratio: FloatVectorProperty(size=3, default=(1.0, 1.0, 1.0), options={"HIDDEN"})
+    chosen_gloss: IntProperty(default=-1, options={"HIDDEN"})
+    chosen_occlusion: BoolProperty(default=False, options={"HIDDEN"})
+    measured: StringProperty(options={"HIDDEN"})
+    # Blender deletes pictures that nobody uses; this one is needed again.
+    measured_image: PointerProperty(type=bpy.types.Image, options={"HIDDEN"})
 
 
 class CdrfMesh(bpy.types.PropertyGroup):
@@ -234,7 +234,7 @@ CLASSES = (CdrfMaterial, CdrfMesh)
 
 
 def register() -> None:
-    """Register the property groups and hang them on Material and Mesh."""
+    """Register the property groups and attach them to Material and Mesh."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Material.cdrf = PointerProperty(type=CdrfMaterial)

@@ -16,7 +16,7 @@ from ..shader.group import (
     variant_of,
 )
 from ..shader.shadows import Choice, choose
-from ..world import light as world
+from ..world.light import stamped
 from . import linking
 from .install import cdrf_node, install
 
@@ -83,7 +83,7 @@ def _install(
     lights = linking.lights_of_material(material, scene, layer)
     wanted = replace(wanted, links=linking.links_of(lights))
     # The world's light as it was at the last Update: a slider must not render anything.
-    light = world.stamped(group)
+    light = stamped(group)
     install(material, ensure_shader_group(wanted, scene, lights, light))
     linking.write_unlit()
 
