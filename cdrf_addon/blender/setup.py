@@ -24,9 +24,9 @@ from .material.lighting import lights_of_translucent
 from .material.model import ensure_chosen, model_key
 from .material.scatter_distance import choose_detail, set_scattering
 from .material.scattering import Scattering, read_scattering
+from .material.shader_group import remove_unused
 from .material.specular import add_specular
 from .material.translucent import materials_on, translucent_materials_of
-from .material.variant import remove_unused
 from .mesh_work import (
     MeshWork,
     group_by_mesh,

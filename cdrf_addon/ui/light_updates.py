@@ -17,8 +17,8 @@ from ..blender.lights.scene_lights import scene_lights
 from ..blender.material import linking
 from ..blender.material.install import cdrf_node
 from ..blender.material.lighting import lights_of_translucent
+from ..blender.material.shader_group import refresh_lights
 from ..blender.material.translucent import translucent_materials_of
-from ..blender.material.variant import refresh_lights
 from ..core.errors import CdrfError
 
 DELAY_SECONDS = 0.2

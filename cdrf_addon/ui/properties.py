@@ -21,7 +21,7 @@ from bpy.props import (
 
 from ..blender.material import settings
 from ..blender.material.model import kind_of_model, set_kind
-from ..blender.material.variant import refresh_shadows
+from ..blender.material.shader_group import refresh_shadows
 from ..blender.shader.shadows import AUTO, SHADOW_ITEMS
 from ..core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
 from ..core.curvature.mesh import NO_CREASE

@@ -11,6 +11,7 @@ import pytest
 from rig import Rig
 
 from cdrf_addon import ids
+from cdrf_addon.blender.pictures import read_picture
 from cdrf_addon.core.colour_scale import HOT, MARK_COLOUR, SIGNED, colours, srgb, ticks
 
 # Blender keeps a colour ramp as a table of 257 texels.
@@ -132,10 +133,8 @@ def test_a_saved_picture_has_a_legend_and_changes_nothing(rig: Rig, tmp_path: Pa
     before = rig.scene.render.image_settings.file_format, rig.scene.view_settings.view_transform
     path = tmp_path / "curvature.png"
     assert bpy.ops.cdrf.save_curvature(filepath=str(path)) == {"FINISHED"}
-    image = bpy.data.images.load(str(path))
-    flat = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(flat)
-    pixels = flat.reshape(240, 320, 4)
+    pixels = read_picture(path)
+    assert pixels.shape == (240, 320, 4)
     legend = pixels[:200, 10:18, :3].reshape(-1, 3)
     # Black, red, yellow and white of the bar, and white letters beside it.
     for colour in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)):

@@ -28,7 +28,7 @@ from ..nodes.tables import ensure_table, find_table, table_of
 from ..shader.group import stamped_variant
 from . import settings
 from .install import cdrf_node, require_editable
-from .variant import change_variant, remove_unused
+from .shader_group import change_variant, remove_unused
 
 
 def model_key(material: bpy.types.Material) -> str:

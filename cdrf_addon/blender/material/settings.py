@@ -18,7 +18,7 @@ from ... import ids
 from ..shader.group import stamped_variant
 from . import specular
 from .install import cdrf_node
-from .variant import change_variant
+from .shader_group import change_variant
 
 SIGMA0_MAX = 1e6
 RATIO_MAX = 1e3

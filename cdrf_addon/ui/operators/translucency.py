@@ -16,12 +16,12 @@ from ...blender.display import curvature as display
 from ...blender.display import legend, viewport
 from ...blender.material import install as materials
 from ...blender.material import linking
+from ...blender.material.shader_group import remove_unused
 from ...blender.material.translucent import (
     translucent_materials_of,
     translucent_materials_on,
     translucent_objects,
 )
-from ...blender.material.variant import remove_unused
 from ...blender.mesh.attributes import remove_curvature
 from ...blender.report import Report
 from ...blender.setup import Setup
