@@ -28,11 +28,17 @@ from typing import Any
 import bpy
 
 from cdrf_addon import compat, register, unregister
-from cdrf_addon.blender import setup, stage
+from cdrf_addon.blender import pictures, setup, stage, units
 from cdrf_addon.blender.display import curvature as display
 from cdrf_addon.blender.display import legend
 from cdrf_addon.blender.material import model as reflectance_models
 from cdrf_addon.blender.material.install import cdrf_node
+from cdrf_addon.blender.material.scatter_distance import apply_preset
+from cdrf_addon.blender.material.translucent import (
+    linked_translucent_materials,
+    translucent_materials_of,
+    translucent_objects,
+)
 from cdrf_addon.command.console import own_arguments, say
 from cdrf_addon.core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
 from cdrf_addon.core.curvature.field import Options
@@ -278,8 +284,8 @@ def prepare(path: Path, options: argparse.Namespace, record: SceneRecord) -> Non
 
 def _make_translucent(record: SceneRecord, mesh_file: bool, options: argparse.Namespace) -> None:
     layer = bpy.context.view_layer
-    objects = setup.translucent_objects(layer)
-    linked = sorted({m.name for item in layer.objects for m in setup.linked_skins(item)})
+    objects = translucent_objects(layer)
+    linked = sorted({m.name for item in layer.objects for m in linked_translucent_materials(item)})
     if linked:
         record.warnings.append(
             f"Linked, so left as in their own file, --sigma0 or not: {', '.join(linked)}."
@@ -318,8 +324,8 @@ def _adjust(
         record.warnings.append(f"'{material.name}' was showing its curvature; skin is rendered.")
         display.hide([material])
     if options.preset:
-        metres = reflectance_models.metres_of(bpy.context.scene)
-        reflectance_models.apply_preset(material, PRESETS[options.preset], metres, 1.0)
+        metres = units.metres_per_unit(bpy.context.scene)
+        apply_preset(material, PRESETS[options.preset], metres, 1.0)
     if options.model:
         reflectance_models.set_kind(material, options.model)
     if options.ratio:
@@ -424,14 +430,14 @@ def _render_all(
             start = time.perf_counter()
             if options.lambert and not (offset and lambert.exists()):
                 with record.stage("render Lambert"), without_scattering():
-                    stage.render_to(lambert)
+                    pictures.render_to(lambert)
             with record.stage("render CDRF"):
                 if sigma is not None:
                     _set_sigma0(dict.fromkeys(own, sigma))
-                stage.render_to(target)
+                pictures.render_to(target)
             if options.lambert:
                 with record.stage("join"):
-                    stage.side_by_side(lambert, target, _joined(target))
+                    pictures.side_by_side(lambert, target, _joined(target))
             seconds = time.perf_counter() - start
             entry = _entry(target, key, seconds, resumed=False)
             entry |= {"frame": frame, "sigma0": sigma}
@@ -451,7 +457,7 @@ def _render_curvature(
 ) -> None:
     """Render the first frame's curvature, at the first sigma0 of the command line."""
     start = time.perf_counter()
-    skins = setup.skins_of(bpy.context.view_layer)
+    skins = translucent_materials_of(bpy.context.view_layer)
     if not skins:
         record.warnings.append("Nothing here has a curvature to show.")
         return

@@ -23,8 +23,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from cdrf_addon.blender.material.model import metres_of
 from cdrf_addon.blender.material.scattering import read_scattering
+from cdrf_addon.blender.units import metres_per_unit
 from cdrf_addon.command.console import own_arguments, say
 from cdrf_addon.core.errors import CdrfError, MeasurementError
 from cdrf_addon.core.measured.fitting import MODELS
@@ -233,7 +233,7 @@ def read_file(options: argparse.Namespace) -> None:
     for note in material.notes:
         say(f"{name}: {note}")
     options.color = [min(max(part, LEAST_ALBEDO), 1.0) for part in material.albedo]
-    metres = metres_of(bpy.context.scene)
+    metres = metres_per_unit(bpy.context.scene)
     options.radius, options.scale, options.unit = [r * metres for r in material.radius], 1.0, "m"
     if material.method in METHODS:
         options.method = material.method

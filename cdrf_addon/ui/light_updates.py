@@ -12,12 +12,13 @@ import bpy
 from bpy.props import BoolProperty
 
 from .. import ids
-from ..blender import setup, state
+from ..blender import state
 from ..blender.lights.scene_lights import scene_lights
 from ..blender.material import linking
-from ..blender.material import model as reflectance_models
 from ..blender.material.install import cdrf_node
-from ..blender.material.lighting import lights_on_skin
+from ..blender.material.lighting import lights_of_translucent
+from ..blender.material.shader_group import refresh_lights
+from ..blender.material.translucent import translucent_materials_of
 from ..core.errors import CdrfError
 
 DELAY_SECONDS = 0.2
@@ -115,14 +116,14 @@ _HANDLERS = (
 def update_lights(context: bpy.types.Context) -> int:
     """Give the scene's lights to its translucent materials; return to how many they were new."""
     scene, layer = context.scene, context.view_layer
-    lights = lights_on_skin(scene, layer)
+    lights = lights_of_translucent(scene, layer)
     changed = 0
-    for skin in setup.skins_of(layer):
+    for skin in translucent_materials_of(layer):
         node = cdrf_node(skin)
         if node is None or node.node_tree.get(ids.SCENE_KEY) != scene.name:
             continue
-        if state.lights_due(node.node_tree, linking.reaching(lights, skin, layer)):
-            reflectance_models.refresh_lights(skin)
+        if state.lights_due(node.node_tree, linking.lights_reaching(lights, skin, layer)):
+            refresh_lights(skin)
             changed += 1
     return changed
 

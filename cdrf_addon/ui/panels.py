@@ -12,7 +12,8 @@ from ..blender import state
 from ..blender.display import curvature as display
 from ..blender.material import install as materials
 from ..blender.material import model as reflectance_models
-from ..blender.material import specular as gloss
+from ..blender.material import specular
+from ..blender.material.translucent import active_translucent_material
 from ..blender.shader.variant import stamped_variant
 from ..blender.shader.wired import wired_lights
 from ..blender.world.stamps import stamped_world
@@ -116,7 +117,7 @@ def draw_ambient(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
 
 def draw_gloss(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
     """Draw the switch of the gloss, where the material has any to keep."""
-    if gloss.find_principled(skin) is not None:
+    if specular.find_principled(skin) is not None:
         row = layout.row()
         row.enabled = skin.is_editable
         row.prop(skin.cdrf, "gloss", text="Gloss of Principled BSDF", toggle=True, icon="MATERIAL")
@@ -196,7 +197,7 @@ class CDRF_PT_main(_View3D, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         item = context.active_object
-        skin = materials.active_skin(item)
+        skin = active_translucent_material(item)
         row = layout.row()
         row.scale_y = 1.5
         row.operator("cdrf.setup", icon="SHADING_RENDERED")

@@ -21,6 +21,7 @@ from bpy.props import EnumProperty, FloatVectorProperty, IntProperty, StringProp
 from ... import ids
 from ...blender.material import model as reflectance_models
 from ...blender.material.install import cdrf_node
+from ...blender.material.scatter_distance import channel_sigma0, set_channel_sigma0
 from ...blender.material.scattering import Scattering, read_scattering
 from ...blender.nodes.tables import ensure_table
 from ...compat import walk_method
@@ -175,7 +176,7 @@ def own_scattering(skin: bpy.types.Material) -> Scattering:
     assert node is not None
     red, green, blue, _ = node.inputs[ids.BASE_COLOR].default_value
     albedo = (red, green, blue)
-    sigma0 = reflectance_models.channel_sigma0(skin)
+    sigma0 = channel_sigma0(skin)
     factors = sigma0_per_radius(albedo, walk_method(RANDOM_WALK))
     radius = [float(own / factor) for own, factor in zip(sigma0, factors, strict=True)]
     return Scattering(albedo, (radius[0], radius[1], radius[2]), RANDOM_WALK, 1.0)
@@ -272,7 +273,7 @@ class CDRF_OT_fit(_PathTraced):
         name = "ring" if reflectance_models.kind_of_model(skin) == RING else "sphere"
         # Right at the object's middle curvature; that sphere is shown, too.
         sigma0 = sigma0_at(fitted, name, self.radius, self._kappa)
-        reflectance_models.set_channel_sigma0(skin, sigma0)
+        set_channel_sigma0(skin, sigma0)
         warn_if_overridden(self, skin)
         for sentence in fitted.sentences():
             self.report({"INFO"}, sentence)

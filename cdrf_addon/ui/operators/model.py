@@ -8,8 +8,11 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ... import ids
 from ...blender.material import model as reflectance_models
-from ...blender.material.install import active_skin, cdrf_node
+from ...blender.material.install import cdrf_node
+from ...blender.material.scatter_distance import apply_preset, overridden, set_scattering
 from ...blender.material.scattering import read_scattering
+from ...blender.material.translucent import active_translucent_material
+from ...blender.units import length_text, metres_per_unit
 from ...core.errors import CdrfError
 from ...core.reflectance.model import DEFAULT_KIND, MODEL_ITEMS
 from ...core.scattering.presets import PRESETS
@@ -23,7 +26,7 @@ class OnSkin(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        skin = active_skin(context.object)
+        skin = active_translucent_material(context.object)
         if skin is None:
             cls.poll_message_set("Make the object translucent first")
             return False
@@ -35,14 +38,14 @@ class OnSkin(bpy.types.Operator):
 
 def skin_of(context: bpy.types.Context) -> bpy.types.Material:
     """Return the material that `OnSkin.poll` found."""
-    skin = active_skin(context.object)
+    skin = active_translucent_material(context.object)
     assert skin is not None
     return skin
 
 
 def warn_if_overridden(operator: bpy.types.Operator, skin: bpy.types.Material) -> None:
     """Say so where a keyframe or a link decides the scatter distance, whatever was set."""
-    what = reflectance_models.overridden(skin)
+    what = overridden(skin)
     if what:
         operator.report({"WARNING"}, what)
 
@@ -102,9 +105,9 @@ class CDRF_OT_preset(OnSkin):
         if self.real_height > 0.0:
             dimensions = context.object.dimensions
             size = (dimensions.z or max(dimensions)) / self.real_height
-        metres = reflectance_models.metres_of(context.scene)
+        metres = metres_per_unit(context.scene)
         try:
-            reflectance_models.apply_preset(skin, preset, metres, size)
+            apply_preset(skin, preset, metres, size)
         except CdrfError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -120,7 +123,7 @@ class CDRF_OT_preset(OnSkin):
     def _warn_of_size(self, item: bpy.types.Object, sigma0: float, metres: float) -> None:
         """Say so where the object is so large or small that the material does not show."""
         blur = sigma0 * item.data.cdrf.median
-        tall = bpy.utils.units.to_string("METRIC", "LENGTH", item.dimensions.z * metres)
+        tall = length_text(item.dimensions.z * metres)
         advice = "give its Real Height in the panel below the viewport (F9)."
         if 0.0 < blur < OPAQUE:
             self.report({"WARNING"}, f"At {tall} tall this object looks opaque: {advice}")
@@ -147,7 +150,7 @@ class CDRF_OT_read_shader(OnSkin):
             return {"CANCELLED"}
         if reflectance_models.has_colour(skin):
             reflectance_models.set_kind(skin, DEFAULT_KIND)
-        reflectance_models.set_scattering(skin, found)
+        set_scattering(skin, found)
         for note in found.notes:
             self.report({"WARNING"}, note)
         warn_if_overridden(self, skin)

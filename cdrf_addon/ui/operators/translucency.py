@@ -16,9 +16,15 @@ from ...blender.display import curvature as display
 from ...blender.display import legend, viewport
 from ...blender.material import install as materials
 from ...blender.material import linking
-from ...blender.material import model as reflectance_models
+from ...blender.material.shader_group import remove_unused
+from ...blender.material.translucent import (
+    translucent_materials_of,
+    translucent_materials_on,
+    translucent_objects,
+)
 from ...blender.mesh.attributes import remove_curvature
-from ...blender.setup import Report, Setup, skins_of, skins_on, translucent_objects
+from ...blender.report import Report
+from ...blender.setup import Setup
 from ...core.curvature.creases import NO_CREASE
 from ...core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
 from ...core.curvature.field import Options
@@ -169,35 +175,37 @@ class CDRF_OT_remove(bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Go to Object Mode first (Tab)")
             return False
-        if not any(skins_on(item) for item in context.selected_objects):
+        if not any(translucent_materials_on(item) for item in context.selected_objects):
             cls.poll_message_set("Select a translucent object")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        chosen = {skin for item in context.selected_objects for skin in skins_on(item)}
+        chosen = {
+            skin for item in context.selected_objects for skin in translucent_materials_on(item)
+        }
         try:
             for material in chosen:
                 materials.require_editable(material)
         except CdrfError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        users = [item for item in bpy.data.objects if chosen & set(skins_on(item))]
+        users = [item for item in bpy.data.objects if chosen & set(translucent_materials_on(item))]
         for material in chosen:
-            display.show_skin(material)
+            display.show_surface(material)
             materials.remove(material)
-        rest = skins_of(context.view_layer)
+        rest = translucent_materials_of(context.view_layer)
         if not any(display.shows_curvature(skin) for skin in rest):
             display.hide(())
             viewport.restore(context)
         for item in users:
-            if not skins_on(item) and item.is_editable and item.data.is_editable:
+            if not translucent_materials_on(item) and item.is_editable and item.data.is_editable:
                 remove_curvature(item.data)
                 item.data.cdrf.fingerprint = ""
                 if ids.SCALE_KEY in item:
                     del item[ids.SCALE_KEY]
         linking.write_unlit()
-        reflectance_models.remove_unused()
+        remove_unused()
         self.report({"INFO"}, f"CDRF: {len(chosen)} material(s) as before")
         return {"FINISHED"}
 
@@ -240,7 +248,7 @@ class CDRF_OT_show_curvature(bpy.types.Operator):
         return _some_translucent(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        skins = skins_of(context.view_layer)
+        skins = translucent_materials_of(context.view_layer)
         showing = ids.DISPLAY_KEY in context.scene or any(map(display.shows_curvature, skins))
         if self.display == "OFF" or (self.display == "TOGGLE" and showing):
             display.hide(display.showing_materials())
@@ -292,7 +300,7 @@ class CDRF_OT_save_curvature(bpy.types.Operator):
             path = path.with_name(f"{path.name}.png")
         try:
             legend.render_curvature(
-                context.scene, skins_of(context.view_layer), path, self.quantity
+                context.scene, translucent_materials_of(context.view_layer), path, self.quantity
             )
         except (CdrfError, OSError, RuntimeError) as error:
             self.report({"ERROR"}, str(error).strip())
@@ -311,10 +319,10 @@ CLASSES = (
 
 _HANDLERS = (
     ("depsgraph_update_post", state.note_touched),
-    ("load_post", state.forget_all),
-    ("load_post", state.forget_worlds),
-    ("undo_post", state.forget_all),
-    ("redo_post", state.forget_all),
+    ("load_post", state.clear_caches),
+    ("load_post", state.clear_world_cache),
+    ("undo_post", state.clear_caches),
+    ("redo_post", state.clear_caches),
 )
 
 
