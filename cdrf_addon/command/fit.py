@@ -38,15 +38,10 @@ from cdrf_addon.core.measured.material_fit import (
 from cdrf_addon.core.measured.measurement import SphereMeasurement, save
 from cdrf_addon.core.measured.model import MeasuredModel
 from cdrf_addon.core.progress import in_words
+from cdrf_addon.measuring.cache import cache_folder
 from cdrf_addon.measuring.figure import draw_fit
-from cdrf_addon.measuring.process import (
-    DEFAULT_QUALITY,
-    QUALITIES,
-    RANDOM_WALK,
-    Request,
-    cache_folder,
-    measure_steps,
-)
+from cdrf_addon.measuring.process import measure_steps
+from cdrf_addon.measuring.request import DEFAULT_QUALITY, QUALITIES, RANDOM_WALK, Request
 
 FORMAT = 1
 PROGRESS_SECONDS = 2.0

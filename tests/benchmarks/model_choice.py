@@ -44,7 +44,8 @@ from cdrf_addon.core.curvature.scale_space import LENGTH_PER_SIGMA0, KappaLevels
 from cdrf_addon.core.progress import run_steps  # noqa: E402
 from cdrf_addon.core.reflectance.models import Model, measured_model, ring, sphere  # noqa: E402
 from cdrf_addon.core.scattering.node_radius import sigma0_per_radius  # noqa: E402
-from cdrf_addon.measuring.process import Request, measure  # noqa: E402
+from cdrf_addon.measuring.process import measure  # noqa: E402
+from cdrf_addon.measuring.request import Request  # noqa: E402
 
 SHAPES = {
     "head": ROOT / "tests" / "data" / "human_head.obj",

@@ -16,11 +16,11 @@ from cdrf_addon.core.measured.material_fit import fit_material
 from cdrf_addon.core.measured.measurement import SphereMeasurement, load
 from cdrf_addon.core.measured.model import MeasuredModel
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
-from cdrf_addon.measuring import process as measuring
+from cdrf_addon.measuring import process
 from cdrf_addon.measuring.figure import decades, draw_fit, steps
 from cdrf_addon.measuring.plot import open_in_blender
-from cdrf_addon.measuring.process import QUALITIES, Quality
 from cdrf_addon.measuring.raster import Raster
+from cdrf_addon.measuring.request import QUALITIES, Quality
 
 
 @pytest.mark.smoke
@@ -95,7 +95,7 @@ def test_a_failure_exits_with_1(
 ) -> None:
     broken = tmp_path / "broken.py"
     broken.write_text("raise RuntimeError('no such device')\n")
-    monkeypatch.setattr(measuring, "WORKER", broken)
+    monkeypatch.setattr(process, "WORKER", broken)
     assert fit.main(["--no-cache", "--output", str(tmp_path / "out")]) == 1
     assert "no such device" in capsys.readouterr().out
     assert list((tmp_path / "out").iterdir()) == []
