@@ -3,39 +3,29 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
-import bpy
 import numpy as np
 
 from ..core.errors import MeasurementError
 from ..core.measured.measurement import SphereMeasurement, load, save
+from ..paths import user_folder
 from .request import Request
 
 
 def cache_folder() -> Path:
-    """Where measurements are kept: the extension's own folder, else Blender's data files.
+    """Return the folder where measurements are kept, and make it.
 
     Raises:
         MeasurementError: No folder can be made.
     """
-    package = (__package__ or "cdrf_addon.measuring").removesuffix(".measuring")
     try:
-        # Refuses packages that were not installed as extensions.
-        return Path(bpy.utils.extension_path_user(package, path="measured", create=True))
-    except (ValueError, OSError):
-        pass
-    try:
-        found = bpy.utils.user_resource("DATAFILES", path="cdrf_measured", create=True)
-        folder = Path(found) if found else Path(tempfile.gettempdir()) / "cdrf_measured"
-        folder.mkdir(parents=True, exist_ok=True)
+        return user_folder("measured")
     except OSError as error:
         raise MeasurementError(
             f"No folder for measurements can be made: {error.strerror}. "
             "Check Blender's user folder."
         ) from error
-    return folder
 
 
 def cached(request: Request, folder: Path) -> SphereMeasurement | None:

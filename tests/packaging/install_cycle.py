@@ -7,6 +7,7 @@ It runs in a process of its own, because bpy reads the profile on import and bec
 and the environment's own igl and scipy must play no part.
 """
 
+import importlib
 import json
 import sys
 from collections.abc import Callable
@@ -86,6 +87,18 @@ def main_job() -> dict[str, object]:
     }
 
 
+def measured_file() -> str:
+    """Where a measurement is kept: of a few small spheres, path-traced as an artist's are."""
+    request = importlib.import_module(f"{MODULE}.cdrf_addon.measuring.request")
+    process = importlib.import_module(f"{MODULE}.cdrf_addon.measuring.process")
+    cache = importlib.import_module(f"{MODULE}.cdrf_addon.measuring.cache")
+    request.QUALITIES["preview"] = request.Quality((24, 8), 1, 2)
+    folder = cache.cache_folder()
+    process.measure(request.Request((0.8, 0.5, 0.4), "preview", scales=(0.1, 1.0)), folder)
+    (file,) = folder.glob("*.npz")
+    return str(file)
+
+
 def bundled_files() -> dict[str, str]:
     """Where the bundled packages come from, once they are imported."""
     return {name: str(__import__(name).__file__) for name in BUNDLED}
@@ -109,6 +122,7 @@ bpy.ops.extensions.package_install_files(
 )
 report["enabled"] = enabled()
 report["job"] = main_job()
+report["measured"] = measured_file()
 report["bundled"] = bundled_files()
 functions = our_functions()
 

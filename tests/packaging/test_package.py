@@ -142,6 +142,11 @@ def test_main_job_of_the_installed_extension(life):
     assert any(name.startswith("CDRF") for name in life["job"]["groups"])
 
 
+def test_measured_tables_are_kept_in_the_folder_of_the_extension(life):
+    own = life["profile"] / "extensions" / ".user" / "user_default" / "cdrf"
+    assert Path(life["measured"]).resolve().parent == own / "measured"
+
+
 def test_disabling_leaves_nothing_behind(life):
     assert not life["enabled after disable"]
     assert life["enabled again"]
