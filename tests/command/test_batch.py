@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 from rig import Rig
 
-from cdrf_addon.command import batch as batch_render
+from cdrf_addon.command import batch_run
+from cdrf_addon.command.batch_job import sigma0_label, unique_stems
+from cdrf_addon.command.batch_options import parse_frames, parse_resolution
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ["--resolution", "32", "--samples", "1"]
@@ -57,19 +59,19 @@ def meshes(rig: Rig, tmp_path: Path) -> dict[str, Path]:
     [("7", [7]), ("1-3", [1, 2, 3]), ("1-9:4", [1, 5, 9]), ("1,4,8-9", [1, 4, 8, 9]), ("-2", [-2])],
 )
 def test_frames(text: str, frames: list[int]) -> None:
-    assert batch_render.parse_frames(text) == frames
+    assert parse_frames(text) == frames
 
 
 @pytest.mark.parametrize("text", ["", "a", "5-1", "1-2-3", "1:0"])
 def test_frames_that_are_none(text: str) -> None:
     with pytest.raises(ArgumentTypeError):
-        batch_render.parse_frames(text)
+        parse_frames(text)
 
 
 @pytest.mark.parametrize("text", ["0", "x", "640x", "10x10x10", "1x1", "99999"])
 def test_resolutions_that_are_none(text: str) -> None:
     with pytest.raises(ArgumentTypeError):
-        batch_render.parse_resolution(text)
+        parse_resolution(text)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +85,7 @@ def test_resolutions_that_are_none(text: str) -> None:
     ],
 )
 def test_wrong_command_lines_exit_with_2(arguments: list[str], tmp_path: Path) -> None:
-    assert batch_render.main([*arguments, "--output", str(tmp_path)]) == 2
+    assert batch_run.main([*arguments, "--output", str(tmp_path)]) == 2
 
 
 @pytest.mark.smoke
@@ -161,7 +163,7 @@ def test_prepared_scene_keeps_its_settings(rig: Rig, tmp_path: Path) -> None:
 
 def test_unique_stems() -> None:
     paths = [Path("a/x.obj"), Path("b/x.obj"), Path("x-2.ply")]
-    assert batch_render.unique_stems(paths) == ["x", "x-2", "x-2-2"]
+    assert unique_stems(paths) == ["x", "x-2", "x-2-2"]
 
 
 def test_animated_sigma0_is_replaced_and_display_taken_off(rig: Rig, tmp_path: Path) -> None:
@@ -202,5 +204,5 @@ def test_journal_survives_a_kill_and_any_summary(meshes: dict[str, Path], tmp_pa
 
 
 def test_close_sigmas_have_files_of_their_own() -> None:
-    labels = {batch_render._label(value) for value in (0.123456789, 0.12345678, 0.1, 1.0, 1e-7)}
+    labels = {sigma0_label(value) for value in (0.123456789, 0.12345678, 0.1, 1.0, 1e-7)}
     assert labels == {"s0.123456789", "s0.12345678", "s0.1", "s1", "s1e-07"}

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-from cdrf_addon.command import fit
+from cdrf_addon.command import fit_run
 from cdrf_addon.core.measured.material_fit import fit_material
 from cdrf_addon.core.measured.measurement import SphereMeasurement, load
 from cdrf_addon.core.measured.model import MeasuredModel
@@ -35,7 +35,7 @@ def test_the_command_writes_its_three_files(
     out = tmp_path / "out"
     arguments = ["--color", "0.9", "0.8", "0.7", "--radius", "1", "0.5", "0", "--scale", "2"]
     arguments += ["--unit", "mm", "--quality", "preview", "--no-cache", "--output", str(out)]
-    assert fit.main(arguments) == 0
+    assert fit_run.main(arguments) == 0
     assert sorted(path.name for path in out.iterdir() if path.suffix != ".npz") == [
         "fit.json",
         "fit.png",
@@ -79,12 +79,12 @@ def test_the_command_writes_its_three_files(
     ],
 )
 def test_wrong_command_lines_exit_with_2(arguments: list[str], tmp_path: Path) -> None:
-    assert fit.main([*arguments, "--output", str(tmp_path)]) == 2
+    assert fit_run.main([*arguments, "--output", str(tmp_path)]) == 2
     assert list(tmp_path.iterdir()) == []
 
 
 def test_help_teaches(capsys: pytest.CaptureFixture[str]) -> None:
-    assert fit.main(["--help"]) == 0
+    assert fit_run.main(["--help"]) == 0
     told = capsys.readouterr().out
     for word in ("examples", "--color", "mm", "sigma0", "cache"):
         assert word in told
@@ -96,7 +96,7 @@ def test_a_failure_exits_with_1(
     broken = tmp_path / "broken.py"
     broken.write_text("raise RuntimeError('no such device')\n")
     monkeypatch.setattr(process, "WORKER", broken)
-    assert fit.main(["--no-cache", "--output", str(tmp_path / "out")]) == 1
+    assert fit_run.main(["--no-cache", "--output", str(tmp_path / "out")]) == 1
     assert "no such device" in capsys.readouterr().out
     assert list((tmp_path / "out").iterdir()) == []
 
@@ -108,7 +108,7 @@ def test_ctrl_c_ends_the_child_and_is_told(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(time, "sleep", interrupt)
-    assert fit.main(["--no-cache", "--output", str(tmp_path / "out")]) == 130
+    assert fit_run.main(["--no-cache", "--output", str(tmp_path / "out")]) == 130
     assert "Stopped" in capsys.readouterr().out
     assert list((tmp_path / "out").iterdir()) == []
 
