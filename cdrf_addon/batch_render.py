@@ -12,8 +12,6 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import bpy  # noqa: F401  (as a module, Blender enables its extensions when it is imported)
-
 if not __package__:  # run as a file
     folder = Path(__file__).resolve().parent
     # An installed extension has another name; by this one Blender would have the code twice.

@@ -9,6 +9,7 @@ and the environment's own igl and scipy must play no part.
 
 import importlib
 import json
+import runpy
 import sys
 from collections.abc import Callable
 from importlib.abc import MetaPathFinder
@@ -99,6 +100,21 @@ def measured_file() -> str:
     return str(file)
 
 
+def doors() -> dict[str, object]:
+    """What becomes of the commands' files in the installed extension, run as Blender runs them."""
+    folder = Path(sys.modules[f"{MODULE}.cdrf_addon"].__file__ or "").parent
+    names = ("batch_render", "fit")
+    mains = [runpy.run_path(str(folder / f"{name}.py"))["main"] for name in names]
+    out = profile_dir / "batch"
+    code = mains[0]([str(profile_dir / "absent.obj"), "--output", str(out)])
+    return {
+        "packages": [main.__module__ for main in mains],
+        "copies": [name for name in sys.modules if name.partition(".")[0] == "cdrf_addon"],
+        "code": code,
+        "summary": json.loads((out / "summary.json").read_text()),
+    }
+
+
 def bundled_files() -> dict[str, str]:
     """Where the bundled packages come from, once they are imported."""
     return {name: str(__import__(name).__file__) for name in BUNDLED}
@@ -123,6 +139,7 @@ bpy.ops.extensions.package_install_files(
 report["enabled"] = enabled()
 report["job"] = main_job()
 report["measured"] = measured_file()
+report["doors"] = doors()
 report["bundled"] = bundled_files()
 functions = our_functions()
 

@@ -147,6 +147,14 @@ def test_measured_tables_are_kept_in_the_folder_of_the_extension(life):
     assert Path(life["measured"]).resolve().parent == own / "measured"
 
 
+def test_commands_run_as_files_use_the_enabled_extension(life):
+    package = "bl_ext.user_default.cdrf.cdrf_addon.command"
+    assert life["doors"]["packages"] == [f"{package}.batch_run", f"{package}.fit_run"]
+    assert life["doors"]["copies"] == []
+    assert life["doors"]["code"] == 1
+    assert "does not exist" in life["doors"]["summary"]["scenes"][0]["error"]
+
+
 def test_disabling_leaves_nothing_behind(life):
     assert not life["enabled after disable"]
     assert life["enabled again"]
