@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's Fig. 2 (b, c) drawn again: path-traced data, fitted models, residuals, sigma."""
+"""The paper's Fig. 2 (b, c) for a fit: path-traced data, fitted models, residuals, sigma."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MARGIN, END, GAP = 84.0, 30.0, 84.0
 CURVES, RESIDUALS, SIGMAS = (545.0, 980.0), (360.0, 490.0), (84.0, 262.0)
 SIGMA_RANGE = (0.004, 2.0)
 LEGEND = 0.35
-"""Where the legend starts, as a part of the width: to the right of the curves."""
+"""Where the legend starts, as a part of the width: right of the curves."""
 THETA = np.linspace(0.0, math.pi, 361)
 DEGREES = [(value, f"{value:g}°") for value in (0.0, 45.0, 90.0, 135.0, 180.0)]
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One life of the installed extension in one Blender; prints what it saw as a line of JSON.
+"""Install, use, disable and uninstall the extension in one Blender; print a report as JSON.
 
 usage: python install_cycle.py ZIP PROFILE_DIR, with BLENDER_USER_RESOURCES=PROFILE_DIR
 
-It runs in a process of its own, because bpy reads the profile on import and because the checkout
-and the environment's own igl and scipy must play no part.
+It runs in a process of its own, because bpy reads the profile on import and because neither the
+checkout nor the environment's own igl and scipy may be used.
 """
 
 import importlib
@@ -47,7 +47,7 @@ def is_ours(value: object) -> bool:
 
 
 def traces() -> list[str]:
-    """Everything that an add-on can hang into Blender, as sorted names."""
+    """Everything that an add-on can register with Blender, as sorted names."""
     found = [f"type {name}" for name in dir(bpy.types)]
     found += [f"operators {name}" for name in dir(bpy.ops)]
     for name in dir(bpy.types):
@@ -64,7 +64,7 @@ def traces() -> list[str]:
 
 
 def our_functions() -> list[Callable[..., object]]:
-    """Every function of the enabled extension; Blender has no list of timers to look into."""
+    """Every function of the enabled extension; Blender does not list its timers."""
     modules = [module for name, module in sys.modules.items() if name.startswith(MODULE)]
     return [
         value
@@ -101,7 +101,7 @@ def measured_file() -> str:
 
 
 def doors() -> dict[str, object]:
-    """What becomes of the commands' files in the installed extension, run as Blender runs them."""
+    """Run the installed extension's command files as Blender does; report whose code they use."""
     folder = Path(sys.modules[f"{MODULE}.cdrf_addon"].__file__ or "").parent
     names = ("batch_render", "fit")
     mains = [runpy.run_path(str(folder / f"{name}.py"))["main"] for name in names]

@@ -22,7 +22,7 @@ FRESH = (0.11, 0.3)
 SKIN = (0.8, 0.5, 0.4)
 RATIO = (1.0, 0.35, 0.2)
 TINY = Quality((24, 8), 2, 2)
-# Four times the default's paths: what noise is left can be subtracted and hides nothing.
+# Four times the default's paths; the noise that is left is known and is subtracted.
 REFERENCE = Quality((80, 20), 96, 10)
 
 
