@@ -11,7 +11,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty
 
-from .. import ids
+from .. import ids, paths
 from ..blender import state
 from ..blender.lights.scene_lights import scene_lights
 from ..blender.material import linking
@@ -39,7 +39,7 @@ def _switched(self: CdrfPreferences, _context: bpy.types.Context) -> None:
 class CdrfPreferences(bpy.types.AddonPreferences):
     """Preferences of the extension, whose package may lie inside another's."""
 
-    bl_idname = (__package__ or "").removesuffix(".ui").removesuffix(".cdrf_addon")
+    bl_idname = paths.EXTENSION
 
     auto_update: BoolProperty(
         name="Update Lights Automatically",

@@ -20,7 +20,7 @@ from cdrf_addon.core.measured.measurement import SphereMeasurement
 from cdrf_addon.core.measured.model import measured_model
 from cdrf_addon.core.reflectance.model import MEASURED, RING, SPHERE
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
-from cdrf_addon.measuring.process import Request
+from cdrf_addon.measuring.request import Request
 from cdrf_addon.ui.operators import measure as ops_measure
 
 COSINE = np.linspace(-0.96, 0.96, 64)

@@ -33,15 +33,10 @@ from ...core.measured.model import MeasuredModel, measured_model
 from ...core.progress import run_steps
 from ...core.reflectance.model import RING, SPHERE
 from ...core.scattering.node_radius import BURLEY, sigma0_per_radius
+from ...measuring.cache import cache_folder
 from ...measuring.picture import make_picture, picture_path, show_picture
-from ...measuring.process import (
-    DEFAULT_QUALITY,
-    POLL_SECONDS,
-    RANDOM_WALK,
-    Request,
-    cache_folder,
-    measure_steps,
-)
+from ...measuring.process import POLL_SECONDS, measure_steps
+from ...measuring.request import DEFAULT_QUALITY, RANDOM_WALK, Request
 from ..modal import StepByStep
 from .model import OnSkin, skin_of, warn_if_overridden
 
