@@ -39,6 +39,9 @@ autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "exclude-members": "__init__, __new__, __post_init__"}
 napoleon_numpy_docstring = False
 
+# Blocks are commands, formulas and drawings of nodes unless they name a language.
+highlight_language = "none"
+
 html_theme = "furo"
 html_title = "CDRF for Blender"
 html_copy_source = False
