@@ -19,16 +19,24 @@ sys.path.insert(0, str(HERE.parent))
 
 import bpy  # noqa: E402  (the checkout must be importable first)
 
-from cdrf_addon.blender.material import specular as gloss  # noqa: E402
-from cdrf_addon.blender.nodes import groups  # noqa: E402
+from cdrf_addon.blender.material.specular import under_gloss_group  # noqa: E402
+from cdrf_addon.blender.nodes.curvature import diffused_group, display_group  # noqa: E402
+from cdrf_addon.blender.nodes.detail import detail_group  # noqa: E402
+from cdrf_addon.blender.nodes.harmonics import bands_group, harmonics_group  # noqa: E402
+from cdrf_addon.blender.nodes.lights import area_group, light_group  # noqa: E402
+from cdrf_addon.blender.nodes.received import lit_group  # noqa: E402
+from cdrf_addon.blender.nodes.reflectance import (  # noqa: E402
+    CHANNEL_SETS,
+    SEPARATE,
+    reflectance_group,
+)
 from cdrf_addon.blender.nodes.tables import ensure_table  # noqa: E402
-from cdrf_addon.blender.shader import ambient as ambient_nodes  # noqa: E402
-from cdrf_addon.blender.shader import shadows  # noqa: E402
-from cdrf_addon.core.reflectance.models import name_of, profile, ring, sphere  # noqa: E402
+from cdrf_addon.core.reflectance.model import name_of, ring, sphere  # noqa: E402
+from cdrf_addon.core.reflectance.profile import profile  # noqa: E402
 
 ASSET_FILE = HERE / "cdrf.blend"
 TOPOLOGY_FILE = HERE / "topology.txt"
-SKIN_GROUP = f"CDRF Reflectance {name_of(profile().key)} RGB"
+PROFILE_GROUP = f"CDRF Reflectance {name_of(profile().key)} RGB"
 DESCRIPTIONS = {
     "CDRF Sun": "Direction, radiance and blur of a sun for CDRF Reflectance",
     "CDRF Point": "Direction, radiance and blur of a point light for CDRF Reflectance",
@@ -39,7 +47,7 @@ DESCRIPTIONS = {
     "CDRF Reflectance Sphere R+G+B": "Diffusion on a sphere, a sigma for each channel",
     "CDRF Reflectance Ring RGB": "f(theta, sigma) of Kubo et al. 2011, one sigma for all channels",
     "CDRF Reflectance Ring R+G+B": "f(theta, sigma) of Kubo et al. 2011, a sigma for each channel",
-    SKIN_GROUP: "f(theta, sigma) of layered skin (d'Eon and Luebke 2007) in one look-up",
+    PROFILE_GROUP: "f(theta, sigma) of layered skin (d'Eon and Luebke 2007) in one look-up",
     "CDRF Bands Sphere R+G+B": "What diffusion on a sphere leaves of a world's bands",
     "CDRF Harmonics": "A world's light on a surface, as nine harmonics of three colours",
     "CDRF Detail": "Part of a normal map's detail that a scatter distance leaves",
@@ -53,38 +61,38 @@ DESCRIPTIONS = {
 def build_all() -> list[bpy.types.ShaderNodeTree]:
     """Build every static group in an empty file."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    built = [groups.light_group(kind) for kind in ("SUN", "POINT", "SPOT")]
-    built += [groups.area_group(elliptic=elliptic) for elliptic in (False, True)]
+    built = [light_group(kind) for kind in ("SUN", "POINT", "SPOT")]
+    built += [area_group(elliptic=elliptic) for elliptic in (False, True)]
     built += [
-        groups.reflectance_group(channels, ensure_table(model))
+        reflectance_group(channels, ensure_table(model))
         for model in (sphere(), ring(), profile())
-        for channels in groups.CHANNEL_SETS
+        for channels in CHANNEL_SETS
     ]
     built += [
-        groups.reflectance_group(groups.SEPARATE, ensure_table(model), own_cosines=True)
+        reflectance_group(SEPARATE, ensure_table(model), own_cosines=True)
         for model in (sphere(), profile())
     ]
     built += [
-        ambient_nodes.bands_group(channels, ensure_table(model))
+        bands_group(channels, ensure_table(model))
         for model, channels in (
             (sphere(), "RGB"),
-            (sphere(), groups.SEPARATE),
+            (sphere(), SEPARATE),
             (ring(), "RGB"),
             (profile(), "RGB"),
         )
     ]
-    built += [ambient_nodes.harmonics_group(), groups.detail_group(), gloss.under_gloss_group()]
-    built.append(groups.diffused_group())
-    built += [shadows.lit_group(translucent=translucent) for translucent in (False, True)]
-    built += [groups.display_group(signed=signed) for signed in (False, True)]
+    built += [harmonics_group(), detail_group(), under_gloss_group()]
+    built.append(diffused_group())
+    built += [lit_group(translucent=translucent) for translucent in (False, True)]
+    built += [display_group(signed=signed) for signed in (False, True)]
     return built
 
 
 def describe(tree: bpy.types.ShaderNodeTree) -> str:
     """Write a tree's interface and wiring as text, one link or constant a line."""
     lines = [f"# {tree.name}"]
-    for item in tree.interface.items_tree:
-        lines.append(f"{item.in_out.lower()} {item.name}: {item.socket_type}")
+    for socket in tree.interface.items_tree:
+        lines.append(f"{socket.in_out.lower()} {socket.name}: {socket.socket_type}")
     for node in tree.nodes:
         kind = getattr(node, "operation", "") or getattr(node, "projection", "")
         inner = f" ({node.node_tree.name})" if node.type == "GROUP" else ""

@@ -20,7 +20,7 @@ from ..compat import EEVEE
 from ..core.curvature.facets import is_faceted
 from ..core.curvature.field import DEFAULT_OPTIONS, CleanCurvature, Options, curvature_steps
 from ..core.curvature.scale_space import LEVELS, level_steps
-from ..core.curvature.spherical import sphere_curvature
+from ..core.curvature.spherical import curvature_if_spherical
 from ..core.curvature.summary import (
     CONSTANT,
     FLAT,
@@ -34,13 +34,15 @@ from ..core.progress import portion
 from . import state
 from .display import curvature as display
 from .instances import is_instance, shown_objects
-from .lights.scene_lights import MOST_FLAGS, SceneLight, nested_instances
+from .lights.drivers import MOST_FLAGS
+from .lights.scene_lights import SceneLight, nested_instances
 from .material import linking
 from .material import model as reflectance_models
 from .material import specular as gloss
 from .material.install import cdrf_node, install, is_mapped, require_editable
 from .material.lighting import lights_on_skin, lit_elsewhere
 from .material.scattering import Scattering, read_scattering
+from .material.shadow_choice import choose_shadows
 from .mesh.attributes import (
     Shape,
     base_fingerprint,
@@ -56,9 +58,11 @@ from .mesh.attributes import (
     write_curvature,
 )
 from .nodes.tables import adopt_table
-from .shader import group as shader
-from .shader import shadows
-from .world import light as world
+from .shader import variant
+from .shader.bits import MOST_SELECTIVE
+from .shader.group import ensure_shader_group
+from .world.light import WorldLight, world_light
+from .world.surface import is_animated, scene_world
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -171,7 +175,7 @@ class Setup:
         self.borrowed: list[bpy.types.MaterialSlot] = []
         """Slots whose translucent material another file owns: they get a copy of it."""
         self._own: dict[bpy.types.Material, Scattering | None] = {}
-        self.world: world.WorldLight | None = None
+        self.world: WorldLight | None = None
         self._choose(list(objects), only_active_slot, convert)
         self.work = self._gather()
         self.instances = self._instances()
@@ -318,12 +322,12 @@ class Setup:
 
     def _read_world(self) -> None:
         """See what the world gives; without it the lights still shine."""
-        found = world.scene_world(self.scene, self.view_layer)
+        found = scene_world(self.scene, self.view_layer)
         try:
-            self.world = world.world_light(found, again=self.recompute)
+            self.world = world_light(found, again=self.recompute)
         except CdrfError as error:
             self.report.warnings.append(str(error))
-        if found is not None and self.world is not None and world.is_animated(found):
+        if found is not None and self.world is not None and is_animated(found):
             self.report.warnings.append(
                 f"The world '{found.name}' is animated: its strength is followed, the rest is that "
                 f"of frame {self.scene.frame_current}."
@@ -417,7 +421,7 @@ class Setup:
             work.summary = FLAT_SUMMARY
             return np.zeros((len(shape.mesh.vertices), 4 + LEVELS + 2), dtype=np.float32)
         cleaned: CleanCurvature | None = None
-        found = sphere_curvature(shape.mesh)
+        found = curvature_if_spherical(shape.mesh)
         if found is None:
             cleaned = yield from portion(curvature_steps(shape.mesh, work.options), 0.0, 0.75)
             found = cleaned.on_source()
@@ -428,7 +432,7 @@ class Setup:
         finest = np.ones_like(found.kappa)
         if cleaned is not None and work.summary.kind == VARYING:
             diffused = yield from portion(level_steps(cleaned), 0.75, 1.0)
-            levels, finest = diffused.values, diffused.finest
+            levels, finest = diffused.values, diffused.shortest
         limit = np.finfo(np.float32).max
         values = np.column_stack((principal, levels, finest, found.filled))
         return np.clip(values, -limit, limit).astype(np.float32)
@@ -501,14 +505,14 @@ class Setup:
         """Decide where the shader takes kappa from: the least that serves all users."""
         work = self._work_of(material)
         if all(item.kind == FLAT for item in work):
-            return shader.FLAT
+            return variant.FLAT
         if any(abs(size - 1.0) > SAME_SIZE for item in work for size in item.sizes):
-            return shader.SCALED
+            return variant.SCALED
         if all(item.kind == CONSTANT for item in work):
             kappas = [item.mean_values[0] for item in work]
             if max(kappas) - min(kappas) <= 0.01 * max(kappas):
-                return shader.CONSTANT
-        return shader.ATTRIBUTE
+                return variant.CONSTANT
+        return variant.ATTRIBUTE
 
     def _store(self, work: _MeshWork, sources: dict[bpy.types.Material, str]) -> None:
         if not work.mesh.is_editable:
@@ -519,7 +523,7 @@ class Setup:
             for item in work.users
             for material in _materials(item)
         }
-        if not read & {shader.ATTRIBUTE, shader.SCALED}:
+        if not read & {variant.ATTRIBUTE, variant.SCALED}:
             remove_curvature(work.mesh)
         elif work.values is not None:
             principal, levels, rest = np.split(work.values, (4, 4 + LEVELS), axis=1)
@@ -532,7 +536,7 @@ class Setup:
             levels = np.repeat(principal[:, :1], LEVELS, axis=1)
             write_curvature(work.mesh, principal, levels, np.ones_like(principal[:, 0]))
         for item in work.users:
-            scaled = any(sources.get(m) == shader.SCALED for m in _materials(item))
+            scaled = any(sources.get(m) == variant.SCALED for m in _materials(item))
             if scaled:
                 item[ids.SCALE_KEY] = work.length
             elif ids.SCALE_KEY in item:
@@ -547,20 +551,20 @@ class Setup:
         model, lost = reflectance_models.ensure_chosen(material)
         if lost:
             self.report.warnings.append(lost)
-        wanted = shader.variant_of(
+        wanted = variant.variant_of(
             ratio,
             source,
             model,
             mapped=is_mapped(material),
             occluded=settings.ambient_occlusion,
-            shadows=shadows.choose(material, self.view_layer),
+            shadows=choose_shadows(material, self.view_layer),
             links=linking.links_of(lights),
         )
-        group = shader.ensure_shader_group(wanted, self.scene, lights, self.world)
+        group = ensure_shader_group(wanted, self.scene, lights, self.world)
         beyond = linking.without_bit(group)
         if beyond:
             self.report.warnings.append(
-                f"More than {shader.MOST_SELECTIVE} lights are linked to some of the objects that "
+                f"More than {MOST_SELECTIVE} lights are linked to some of the objects that "
                 f"share a material: '{beyond[0]}' shines on all of them. Use more materials."
             )
         before = cdrf_node(material)
@@ -582,7 +586,7 @@ class Setup:
             gloss.add_gloss(material)
         if wanted.mapped and not had_detail:
             reflectance_models.choose_detail(material)
-        if source == shader.CONSTANT:
+        if source == variant.CONSTANT:
             kappas = [item.mean_values[0] for item in work]
             node.inputs[ids.CURVATURE].default_value = float(np.mean(kappas))
 
@@ -613,7 +617,7 @@ class Setup:
             for name in linking.lost_on_saving({item for work in self.work for item in work.users})
         ]
         used = [layer for layer in self.scene.view_layers if layer.use]
-        if len({world.scene_world(self.scene, layer) for layer in used}) > 1:
+        if len({scene_world(self.scene, layer) for layer in used}) > 1:
             told.append(
                 "The view layers have different worlds; the surface has the light of the one that "
                 f"was open ('{self.view_layer.name}')."
@@ -691,7 +695,7 @@ def linked_skins(item: bpy.types.Object) -> list[bpy.types.Material]:
 
 def _present_source(material: bpy.types.Material) -> str:
     node = cdrf_node(material)
-    return shader.stamped_variant(node.node_tree).source if node is not None else ""
+    return variant.stamped_variant(node.node_tree).source if node is not None else ""
 
 
 def _asks_for_sigma0(material: bpy.types.Material) -> bool:

@@ -16,11 +16,16 @@ from .material import linking
 from .material import specular as gloss
 from .material.install import cdrf_node, skin_output
 from .material.lighting import lights_on_skin, lit_elsewhere
+from .material.shadow_choice import choose_shadows
 from .mesh.attributes import base_fingerprint, has_curvature, is_measured, linear_part
 from .nodes.tables import Table, find_table
-from .shader import group as shader
-from .shader import shadows
-from .world import light as world
+from .shader.bits import bits_due
+from .shader.due import is_current, layers_due, shadows_due
+from .shader.variant import ATTRIBUTE, SCALED, stamped_variant, variant_of
+from .shader.wired import wanted_light, wired_lights
+from .world.light import clear_captured
+from .world.stamps import is_due
+from .world.surface import scene_world
 
 _touched: set[int] = set()
 """session_uid of meshes edited since their hash was last compared."""
@@ -39,7 +44,7 @@ def note_touched(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
 @bpy.app.handlers.persistent
 def forget_worlds(*_args: object) -> None:
     """Handler: another file was loaded."""
-    world.forget()
+    clear_captured()
 
 
 @bpy.app.handlers.persistent
@@ -67,12 +72,12 @@ def _mesh_changed(mesh: bpy.types.Mesh, playing: bool) -> bool:
 
 def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str:
     """Say how the scene's lights differ from those the group was made for; empty if they do not."""
-    if shader.is_current(group, lights):
+    if is_current(group, lights):
         return ""
-    wired = shader.wired_lights(group)
+    wired = wired_lights(group)
     now = {light.source: light for light in lights}
-    before = {branch[:2]: branch for branch in wired if branch.object is not None}
-    table = find_table(shader.stamped_variant(group).model)
+    before = {branch.source: branch for branch in wired if branch.object is not None}
+    table = find_table(stamped_variant(group).model)
     if table is None:
         return "the reflectance table was deleted; choose the model again"
     parts = []
@@ -92,17 +97,17 @@ def lights_due(group: bpy.types.ShaderNodeTree, lights: list[SceneLight]) -> str
         parts = [f"light '{name}' got another size" for name in resized]
     if not parts:
         due = (
-            shader.layers_due(group, lights),
-            shader.shadows_due(group, lights),
-            shader.bits_due(group),
+            layers_due(group, lights),
+            shadows_due(group, lights),
+            bits_due(group),
         )
         parts = [part for part in due if part]
     return "; ".join(parts) or "the node group is incomplete or of an older version"
 
 
 def _other_lookups(group: bpy.types.ShaderNodeTree, table: Table, light: SceneLight) -> bool:
-    wanted = shader.wanted_branch(table, shader.stamped_variant(group), light)
-    return wanted not in shader.wired_lights(group)
+    wanted = wanted_light(table, stamped_variant(group), light)
+    return wanted not in wired_lights(group)
 
 
 def reasons_to_update(
@@ -122,7 +127,7 @@ def reasons_to_update(
         group = node.node_tree
         if not slot.material.is_editable:
             here = linking.reaching(lights, slot.material, view_layer)
-            if {one[:2] for one in shader.wired_lights(group)} != {one.source for one in here}:
+            if {one.source for one in wired_lights(group)} != {one.source for one in here}:
                 reasons.append(
                     f"'{slot.material.name}' is linked and has the lights of its own file: Make "
                     "Translucent gives a library override of the object a copy lit by this scene."
@@ -146,19 +151,19 @@ def reasons_to_update(
             reasons.append(f"Lights: {due}.")
         elif linking.unlit_is_due(item):
             reasons.append(f"Lights: '{item.name}' receives others now.")
-        if not playing and world.is_due(group, world.scene_world(scene, view_layer)):
+        if not playing and is_due(group, scene_world(scene, view_layer)):
             reasons.append("The world's light was changed.")
-        variant = shader.stamped_variant(group)
+        variant = stamped_variant(group)
         if node.inputs[ids.NORMAL].is_linked != variant.mapped:
             done = "taken off" if variant.mapped else "connected to"
             reasons.append(f"A normal map was {done} the CDRF node.")
         ratio = tuple(node.inputs[ids.SIGMA0_RATIO].default_value)
-        shadowed = shadows.choose(slot.material, view_layer).cast
+        shadowed = choose_shadows(slot.material, view_layer).cast
         if shadowed and not variant.shadows.cast:
             reasons.append("Shadows: an object that can cast one is new.")
         elif variant.shadows.cast and not shadowed:
             reasons.append("Shadows: nothing casts one any more.")
-        wanted = shader.variant_of(
+        wanted = variant_of(
             ratio,
             variant.source,
             variant.model,
@@ -169,7 +174,7 @@ def reasons_to_update(
         )
         if wanted != variant:
             reasons.append("The colour ratio was changed in the node.")
-        if variant.source in {shader.ATTRIBUTE, shader.SCALED} and not has_curvature(item.data):
+        if variant.source in {ATTRIBUTE, SCALED} and not has_curvature(item.data):
             reasons.append(f"'{item.name}' has no curvature yet.")
     reasons += _shape_reasons(item, view_layer, playing)
     return list(dict.fromkeys(reasons))

@@ -38,7 +38,7 @@ from cdrf_addon.core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS,
 from cdrf_addon.core.curvature.field import Options
 from cdrf_addon.core.errors import CdrfError, ParameterError, SceneError
 from cdrf_addon.core.progress import in_words
-from cdrf_addon.core.reflectance.models import MODEL_ITEMS
+from cdrf_addon.core.reflectance.model import MODEL_ITEMS
 from cdrf_addon.core.scattering.presets import PRESETS
 
 VERSION = 1

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    Evaluate = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
+    """A model of reflectance: theta and sigma, radians, broadcast, to f(theta, sigma)."""
     Form = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 

@@ -311,7 +311,7 @@ def _read(request: Request, path: Path) -> SphereMeasurement:
     return SphereMeasurement(
         np.array(request.albedo),
         np.array(request.scales),
-        *pooled,
+        *(pooled.cosine, pooled.values, pooled.errors),
         samples=request.samples() * quality.passes,
         seed=request.seed,
         blender=str(raw["blender"]),

@@ -13,12 +13,14 @@ from ..blender.display import curvature as display
 from ..blender.material import install as materials
 from ..blender.material import model as reflectance_models
 from ..blender.material import specular as gloss
-from ..blender.shader import group as shader
-from ..blender.world import light as world
+from ..blender.shader.variant import stamped_variant
+from ..blender.shader.wired import wired_lights
+from ..blender.world.stamps import stamped
+from ..blender.world.surface import FIXED, SCALED
 from ..compat import EEVEE, HAS_RAYCAST
 from ..core.curvature.estimators import METHODS
 from ..core.curvature.summary import CONSTANT, FLAT, VARYING
-from ..core.reflectance.models import MODEL_ITEMS, PROFILE
+from ..core.reflectance.model import MODEL_ITEMS, PROFILE
 
 _MOST_LINES = 6
 
@@ -55,11 +57,11 @@ def draw_skin(
     if ids.DETAIL_SIZE in node.inputs:
         column.prop(node.inputs[ids.DETAIL_SIZE], "default_value", text="Detail Size")
     column.prop(material.cdrf, "shadows")
-    shadowed = shader.stamped_variant(node.node_tree).shadows
+    shadowed = stamped_variant(node.node_tree).shadows
     if shadowed.cast and HAS_RAYCAST:
         column.prop(material.cdrf, "shadow_edges")
-    wired = shader.wired_lights(node.node_tree)
-    lookups = sum(len(shared.split()) for *_, shared in wired)
+    wired = wired_lights(node.node_tree)
+    lookups = sum(len(light.lookups.split()) for light in wired)
     plural = "" if lookups == 1 else "s"
     text = f"{lookups} look-up{plural} for {len(wired)} light(s)"
     text += ", shadows" if shadowed.cast else ""
@@ -92,13 +94,13 @@ def draw_ambient(layout: bpy.types.UILayout, skin: bpy.types.Material) -> None:
     """Draw what of the world's light reaches the material, and its occlusion."""
     node = materials.cdrf_node(skin)
     assert node is not None
-    light = world.stamped(node.node_tree)
+    light = stamped(node.node_tree)
     if light is None:
         layout.label(text="No light from the world", icon="WORLD")
         return
     text = {
-        world.FIXED: "World as of the last Update",
-        world.SCALED: "World; its strength is followed",
+        FIXED: "World as of the last Update",
+        SCALED: "World; its strength is followed",
     }.get(light.kind, "World; colour and strength followed")
     if light.rotation():
         text = "World; strength and rotation followed"

@@ -21,13 +21,14 @@ from .. import ids
 from ..blender.material import model as reflectance_models
 from ..blender.material import specular as gloss
 from ..blender.material.install import cdrf_node
-from ..blender.shader.group import stamped_variant
-from ..blender.shader.shadows import AUTO, SHADOW_ITEMS
+from ..blender.material.shadow_choice import AUTO, SHADOW_ITEMS
+from ..blender.shader.variant import stamped_variant
+from ..core.curvature.creases import NO_CREASE
 from ..core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
-from ..core.curvature.mesh import NO_CREASE
 from ..core.curvature.summary import CONSTANT, FLAT, VARYING
 from ..core.errors import CdrfError
-from ..core.reflectance.models import MODEL_ITEMS, PROFILE, RING, SKIN_PROFILE, SPHERE
+from ..core.reflectance.model import MODEL_ITEMS, PROFILE, RING, SPHERE
+from ..core.reflectance.profile import SKIN_PROFILE
 
 UNSET = -1.0
 SIGMA0_MAX = 1e6

@@ -45,7 +45,7 @@ from surfaces import ALL_SURFACES, BORDER_ROWS, noisy, torus  # noqa: E402
 
 from cdrf_addon.core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS  # noqa: E402
 from cdrf_addon.core.curvature.field import CurvatureField, principal_curvatures  # noqa: E402
-from cdrf_addon.core.curvature.mesh import TriMesh  # noqa: E402
+from cdrf_addon.core.curvature.tri_mesh import TriMesh  # noqa: E402
 
 SEED = 19760102
 SIZES = (1_000, 10_000, 100_000, 1_000_000)

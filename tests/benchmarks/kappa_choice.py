@@ -42,7 +42,7 @@ from scipy.sparse.linalg import splu  # noqa: E402
 from scipy.spatial import cKDTree  # noqa: E402
 
 from cdrf_addon.compat import ensure_node_tree  # noqa: E402
-from cdrf_addon.core.reflectance.ring import reflectance  # noqa: E402
+from cdrf_addon.core.reflectance.ring_model import ring_reflectance  # noqa: E402
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ def sigma_nodes() -> Array:
 def ring_table() -> Array:
     """The paper's reflectance: blur along a circle."""
     theta = np.linspace(0.0, math.pi, THETA_NODES)
-    return reflectance(theta[:, None], sigma_nodes()[None, :])
+    return ring_reflectance(theta[:, None], sigma_nodes()[None, :])
 
 
 def sphere_table() -> Array:

@@ -41,16 +41,8 @@ from cdrf_addon.core.reflectance.lut import (  # noqa: E402
     build_lut,
     sample_lut,
 )
-from cdrf_addon.core.reflectance.models import (  # noqa: E402
-    RING,
-    SKIN_PROFILE,
-    SPHERE,
-    Model,
-    Profile,
-    profile,
-    ring,
-    sphere,
-)
+from cdrf_addon.core.reflectance.model import RING, SPHERE, Model, ring, sphere  # noqa: E402
+from cdrf_addon.core.reflectance.profile import SKIN_PROFILE, Profile, profile  # noqa: E402
 
 Values = NDArray[np.float64]
 Wire = Callable[[TreeBuilder, Any, Any], Any]

@@ -39,10 +39,11 @@ from kappa_choice import (  # noqa: E402
 from machine import machine  # noqa: E402
 
 from cdrf_addon.core.curvature.field import Options, curvature_steps  # noqa: E402
-from cdrf_addon.core.curvature.mesh import TriMesh  # noqa: E402
 from cdrf_addon.core.curvature.scale_space import LENGTH_PER_SIGMA0, KappaLevels, level_steps  # noqa: E402
+from cdrf_addon.core.curvature.tri_mesh import TriMesh  # noqa: E402
+from cdrf_addon.core.measured.model import measured_model  # noqa: E402
 from cdrf_addon.core.progress import run_steps  # noqa: E402
-from cdrf_addon.core.reflectance.models import Model, measured_model, ring, sphere  # noqa: E402
+from cdrf_addon.core.reflectance.model import Model, ring, sphere  # noqa: E402
 from cdrf_addon.core.scattering.node_radius import sigma0_per_radius  # noqa: E402
 from cdrf_addon.measuring.process import Request, measure  # noqa: E402
 

@@ -16,7 +16,8 @@ from cdrf_addon.blender.material import model as reflectance_models
 from cdrf_addon.blender.nodes.tables import ensure_table, find_table
 from cdrf_addon.compat import ensure_node_tree
 from cdrf_addon.core.measured.measurement import SphereMeasurement
-from cdrf_addon.core.reflectance.models import MEASURED, RING, SPHERE, measured_model
+from cdrf_addon.core.measured.model import measured_model
+from cdrf_addon.core.reflectance.model import MEASURED, RING, SPHERE
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 from cdrf_addon.measuring.process import Request
 from cdrf_addon.ui.operators import measure as ops_measure

@@ -14,14 +14,8 @@ from cdrf_addon import ids
 from cdrf_addon.blender.material.scattering import read_scattering
 from cdrf_addon.blender.nodes.tables import ensure_table, find_table
 from cdrf_addon.compat import ensure_node_tree, walk_method
-from cdrf_addon.core.reflectance.models import (
-    PROFILE,
-    RING,
-    SKIN_PROFILE,
-    SPHERE,
-    parse_profile,
-    ring,
-)
+from cdrf_addon.core.reflectance.model import PROFILE, RING, SPHERE, ring
+from cdrf_addon.core.reflectance.profile import SKIN_PROFILE, parse_profile
 from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
 from cdrf_addon.core.scattering.presets import PRESETS
 
@@ -150,16 +144,16 @@ def test_soft_lights_cost_a_profile_three_look_ups_and_resizing_is_noticed(
     egg: bpy.types.Object, rig: Rig
 ) -> None:
     from cdrf_addon.blender import state
-    from cdrf_addon.blender.shader import group as shader
+    from cdrf_addon.blender.shader.wired import wired_lights
 
     egg.active_material.cdrf.model = PROFILE
-    assert [looks for *_, looks in shader.wired_lights(group_of(egg))] == ["RGB"]
+    assert [light.lookups for light in wired_lights(group_of(egg))] == ["RGB"]
     sun = next(item for item in rig.scene.objects if item.type == "LIGHT")
     sun.data.angle = math.radians(10.0)
     reasons = state.reasons_to_update(egg, rig.scene, bpy.context.view_layer)
     assert any("another size" in reason for reason in reasons)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    assert [looks for *_, looks in shader.wired_lights(group_of(egg))] == ["R G B"]
+    assert [light.lookups for light in wired_lights(group_of(egg))] == ["R G B"]
     assert not state.reasons_to_update(egg, rig.scene, bpy.context.view_layer)
 
 

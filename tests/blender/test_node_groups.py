@@ -12,7 +12,7 @@ import pytest
 from rig import Rig
 
 from cdrf_addon import ids
-from cdrf_addon.blender.nodes import groups
+from cdrf_addon.blender.nodes import lights
 
 FOLDER = Path(__file__).resolve().parents[2] / "node_groups"
 
@@ -35,18 +35,18 @@ def test_asset_file_holds_the_groups(rig: Rig) -> None:
 
 
 def test_groups_are_reused_and_older_ones_rebuilt_in_place(rig: Rig) -> None:
-    first = groups.sun_group()
+    first = lights.sun_group()
     first.name = "Renamed by the artist"
-    assert groups.sun_group() == first
+    assert lights.sun_group() == first
     count = len(first.nodes)
     first.nodes.clear()
-    first[ids.VERSION_KEY] = groups.VERSION - 1
-    assert groups.sun_group() == first
+    first[ids.VERSION_KEY] = lights.VERSION - 1
+    assert lights.sun_group() == first
     assert len(first.nodes) == count
     assert len(first.interface.items_tree) == 7
 
 
 def test_a_foreign_group_of_the_same_name_is_left_alone(rig: Rig) -> None:
     foreign = bpy.data.node_groups.new("CDRF Sun", "ShaderNodeTree")
-    ours = groups.sun_group()
+    ours = lights.sun_group()
     assert ours != foreign and not foreign.nodes

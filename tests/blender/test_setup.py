@@ -14,7 +14,8 @@ from rig import Rig, cdrf_node
 from cdrf_addon import ids
 from cdrf_addon.blender import state
 from cdrf_addon.blender.setup import Setup, run
-from cdrf_addon.blender.shader import group as shader
+from cdrf_addon.blender.shader import bits
+from cdrf_addon.blender.shader.wired import wired_lights
 
 
 def attribute(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -238,7 +239,7 @@ def test_light_linking_chooses_the_branches_of_each_material(rig: Rig) -> None:
         return " ".join(state.reasons_to_update(item, rig.scene, bpy.context.view_layer))
 
     def lamps(item: bpy.types.Object) -> set[str]:
-        wired = shader.wired_lights(cdrf_node(item).node_tree)
+        wired = wired_lights(cdrf_node(item).node_tree)
         return {branch.object.name for branch in wired if branch.object is not None}
 
     assert "linked to other objects" in due(first)
@@ -254,10 +255,10 @@ def test_light_linking_chooses_the_branches_of_each_material(rig: Rig) -> None:
     # A light has one bit, whatever group it is in.
     second.data.materials.append(first.data.materials[0])
     bpy.ops.cdrf.update()
-    bits = shader.light_bits(cdrf_node(first).node_tree)
-    assert set(bits) == {(key, None), (rim, None)}
-    assert second[ids.UNLIT_KEY] == 1 << bits[key, None]
-    assert first[ids.UNLIT_KEY] == 1 << bits[rim, None]
+    places = bits.light_bits(cdrf_node(first).node_tree)
+    assert set(places) == {(key, None), (rim, None)}
+    assert second[ids.UNLIT_KEY] == 1 << places[key, None]
+    assert first[ids.UNLIT_KEY] == 1 << places[rim, None]
     key.light_linking.receiver_collection.objects.link(second)
     rim.light_linking.receiver_collection = None
     assert "'Renamed' is linked to other objects" in due(first)
@@ -270,7 +271,7 @@ def test_light_linking_chooses_the_branches_of_each_material(rig: Rig) -> None:
 def test_more_linked_lights_than_a_number_has_bits(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shader, "MOST_SELECTIVE", 1)
+    monkeypatch.setattr(bits, "MOST_SELECTIVE", 1)
     first = rig.sphere()
     second = rig.link(first.data)
     for name in ("Key", "Rim"):
@@ -296,7 +297,7 @@ def test_instanced_lights_deleted_and_nested(rig: Rig) -> None:
     group = cdrf_node(ball).node_tree
     drivers = group.animation_data.drivers
     assert all(curve.driver.is_simple_expression and curve.driver.is_valid for curve in drivers)
-    before = {(wired.object, wired.instance) for wired in shader.wired_lights(group)}
+    before = {(wired.object, wired.instance) for wired in wired_lights(group)}
     assert before == {(lamp, None), (lamp, empties[0]), (lamp, empties[1])}
     bpy.data.objects.remove(empties[1])
     due = state.reasons_to_update(ball, rig.scene, bpy.context.view_layer)

@@ -18,8 +18,8 @@ import pytest
 from numpy.typing import ArrayLike
 
 from cdrf_addon.core.curvature.field import principal_curvatures
-from cdrf_addon.core.curvature.mesh import TriMesh
 from cdrf_addon.core.curvature.summary import summarise
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 from cdrf_addon.core.errors import CdrfError
 
 pytestmark = pytest.mark.smoke

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import spsolve
+from small_meshes import icosphere, plane
 
 from cdrf_addon.core.curvature import diffusion
+from cdrf_addon.core.curvature.clean import CleanMesh, clean
 from cdrf_addon.core.curvature.diffusion import Diffusion
-from cdrf_addon.core.curvature.mesh import CleanMesh, TriMesh, clean
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 from cdrf_addon.core.progress import run_steps
-from tests.core.test_mesh import icosphere, plane
 
 # Relative RMS error of a harmonic of degree d; the second-order error of linear elements, plus the
 # residual of the conjugate gradients (3e-4), rounded up.

@@ -12,7 +12,8 @@ import pytest
 from cdrf_addon.core.errors import ParameterError
 from cdrf_addon.core.reflectance import environment as ambient
 from cdrf_addon.core.reflectance.lut import build_lut, sigma_axis
-from cdrf_addon.core.reflectance.models import Model, profile, ring, sphere
+from cdrf_addon.core.reflectance.model import Model, ring, sphere
+from cdrf_addon.core.reflectance.profile import profile
 
 SIZE = (128, 256)
 SIGMAS = np.array([0.0, 1e-3, 0.01, 0.1, 0.5, 1.0, 2.0, 5.0])

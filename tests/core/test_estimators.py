@@ -7,14 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from small_meshes import icosphere, mixed_mesh
 from surfaces import ALL_SURFACES, Surface
 
 from cdrf_addon.core.curvature.estimators import METHODS
 from cdrf_addon.core.curvature.field import CurvatureField, principal_curvatures
-from cdrf_addon.core.curvature.mesh import TriMesh
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 from cdrf_addon.core.errors import ParameterError
-from tests.core.test_curvature import mixed_mesh
-from tests.core.test_mesh import icosphere
 
 # RMS and worst error of kappa at about 10,000 vertices, in % of the surface's RMS kappa, away from
 # borders. Measured and rounded up by a third or less; results/estimators.md has the whole table. On

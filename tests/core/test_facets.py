@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from small_meshes import icosphere, moebius, plane
 
 from cdrf_addon.core.curvature.facets import is_faceted
-from cdrf_addon.core.curvature.mesh import TriMesh
-from tests.core.test_mesh import icosphere, moebius, plane
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 
 CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T * 2.0 - 1.0
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

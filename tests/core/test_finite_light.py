@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cdrf_addon.core.reflectance.finite_light import RING_GAIN, SPHERE_GAIN, finite_light
-from cdrf_addon.core.reflectance.ring import reflectance
+from cdrf_addon.core.reflectance.ring_model import ring_reflectance
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 pytestmark = pytest.mark.smoke
@@ -100,7 +100,7 @@ def test_the_quadrature_is_sound(half_angle: float) -> None:
 @pytest.mark.parametrize(("half_angle", "worst"), WORST)
 def test_the_blur_stands_for_the_light(half_angle: float, worst: float, along: str) -> None:
     theta = np.linspace(0.0, math.pi, 1441)
-    model = {"ring": reflectance, "sphere": sphere_reflectance}[along]
+    model = {"ring": ring_reflectance, "sphere": sphere_reflectance}[along]
     variance, gain = finite_light(
         math.sin(half_angle) ** 2, {"ring": RING_GAIN, "sphere": SPHERE_GAIN}[along]
     )

@@ -18,11 +18,14 @@ from pathlib import Path
 
 import numpy as np
 
+from cdrf_addon.core.curvature.clean import CleanMesh
+from cdrf_addon.core.curvature.creases import NO_CREASE
 from cdrf_addon.core.curvature.estimators import METHODS
 from cdrf_addon.core.curvature.field import CleanCurvature, Options, curvature_steps
-from cdrf_addon.core.curvature.mesh import NO_CREASE, CleanMesh, TriMesh, shared_edges
 from cdrf_addon.core.curvature.scale_space import LEVELS, level_steps
 from cdrf_addon.core.curvature.summary import summarise
+from cdrf_addon.core.curvature.topology import shared_edges
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 from cdrf_addon.core.errors import CdrfError
 from cdrf_addon.core.progress import run_steps
 
@@ -152,11 +155,11 @@ def top(cleaned: CleanCurvature) -> float:
 
 
 def bends(mesh: CleanMesh) -> bool:
-    """Tell whether two neighbouring faces, wound alike, meet at more than 5 degrees."""
-    normal, doubled_area = mesh.face_normals
-    unit = normal / doubled_area
-    face, other, _, _ = shared_edges(mesh.triangles, len(mesh.vertices))
-    cosine = (unit[:, face] * unit[:, other]).sum(axis=0)
+    """Return whether two neighbouring faces, wound alike, meet at more than 5 degrees."""
+    normals = mesh.face_normals
+    unit = normals.scaled / normals.doubled_area
+    edges = shared_edges(mesh.triangles, len(mesh.vertices))
+    cosine = (unit[:, edges.face] * unit[:, edges.other]).sum(axis=0)
     # Folded flat on itself, a surface has no curvature to speak of either.
     return bool(((cosine < math.cos(math.radians(5.0))) & (cosine > -0.9)).any())
 

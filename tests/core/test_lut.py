@@ -16,7 +16,8 @@ from cdrf_addon.core.reflectance.lut import (
     sample_lut,
     sigma_axis,
 )
-from cdrf_addon.core.reflectance.models import PROFILE, RING, SPHERE, Model, profile, ring, sphere
+from cdrf_addon.core.reflectance.model import PROFILE, RING, SPHERE, Model, ring, sphere
+from cdrf_addon.core.reflectance.profile import profile
 
 pytestmark = pytest.mark.smoke
 

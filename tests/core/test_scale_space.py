@@ -6,15 +6,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from small_meshes import plane
 from surfaces import ellipsoid, noisy, torus
 
 from cdrf_addon.core.curvature.field import curvature_steps
-from cdrf_addon.core.curvature.mesh import TriMesh
 from cdrf_addon.core.curvature.scale_space import LEVEL_RATIO, LEVELS, KappaLevels, level_steps
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 from cdrf_addon.core.progress import run_steps
-from tests.core.test_mesh import plane
 
-# Difference between the finest levels of 2,000 and of 60,000 vertices, in units of the mean kappa:
+# Difference between the shortest levels of 2,000 and 60,000 vertices, in units of the mean kappa:
 # the coarse mesh's own error of curvature, some percent.
 RESOLUTION = 0.06
 # Of the diffused levels of a scan with noise of 5 % of an edge, in the same unit.
@@ -31,8 +31,8 @@ def test_lengths_follow_the_size() -> None:
     one = levels_of(surface.vertices, surface.triangles)
     other = levels_of(surface.vertices * 1e-3, surface.triangles)
     area = 4.0 * np.pi**2 * 0.4
-    assert one.finest[0] == pytest.approx(np.sqrt(area) / LEVEL_RATIO**LEVELS, rel=0.01)
-    assert other.finest == pytest.approx(one.finest * 1e-3, rel=1e-9)
+    assert one.shortest[0] == pytest.approx(np.sqrt(area) / LEVEL_RATIO**LEVELS, rel=0.01)
+    assert other.shortest == pytest.approx(one.shortest * 1e-3, rel=1e-9)
     assert other.values == pytest.approx(one.values * 1e3, rel=1e-6)
 
 
@@ -46,7 +46,7 @@ def test_the_same_shape_has_the_same_levels_at_any_resolution(make) -> None:
     for level in range(LEVELS):
         apart = coarse.values[:, level] - fine.values[at, level]
         assert np.sqrt((apart**2).mean()) <= RESOLUTION * scale, level
-    assert coarse.finest[0] == pytest.approx(fine.finest[0], rel=0.01)
+    assert coarse.shortest[0] == pytest.approx(fine.shortest[0], rel=0.01)
 
 
 @pytest.mark.smoke
@@ -84,9 +84,9 @@ def test_other_components_and_stray_vertices_do_not_matter() -> None:
         np.concatenate((surface.triangles, faces + len(surface.vertices))),
     )
     count = len(surface.vertices)
-    assert both.finest[:count] == pytest.approx(alone.finest, rel=1e-9)
+    assert both.shortest[:count] == pytest.approx(alone.shortest, rel=1e-9)
     assert both.values[:count] == pytest.approx(alone.values, rel=1e-3)
     flown = surface.vertices * 0.1
     flown[17] *= 1e4
     stray = levels_of(flown, surface.triangles)
-    assert stray.finest[0] == pytest.approx(alone.finest[0], rel=0.15)
+    assert stray.shortest[0] == pytest.approx(alone.shortest[0], rel=0.15)

@@ -5,16 +5,16 @@ import math
 
 import numpy as np
 import pytest
+from small_meshes import grid_triangles, icosphere, plane
 
 from cdrf_addon.core.curvature.field import CurvatureField, principal_curvatures
-from cdrf_addon.core.curvature.mesh import TriMesh
 from cdrf_addon.core.curvature.summary import CONSTANT, FLAT, VARYING, CurvatureSummary, summarise
-from tests.core.test_mesh import grid_triangles, icosphere, plane
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 
 pytestmark = pytest.mark.smoke
 
 TOLERANCE = {
-    # The fit's bias on an icosphere, worst vertex (tests/core/test_curvature.py), rounded up.
+    # The fit's bias on an icosphere, worst vertex (tests/core/test_field.py), rounded up.
     "subdivision 4": 7e-3,
     "subdivision 5": 2e-3,
     # A cylinder of 128 segments: 0.25 % of 1 / r measured in k1 at its open ends, 0.23 % in kappa.

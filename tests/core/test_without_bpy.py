@@ -34,12 +34,12 @@ modules = {name: importlib.import_module(start + name) for name in names}
 # Opening Blender must not wait for these: they are loaded when something is computed.
 print("early:", sorted({"scipy", "igl"} & set(sys.modules)))
 
-value = float(modules["reflectance.ring"].reflectance(0.0, 0.3))
+value = float(modules["reflectance.ring_model"].ring_reflectance(0.0, 0.3))
 grid = [(x, y, -0.05 * (x * x + y * y)) for x in range(-3, 4) for y in range(-3, 4)]
 faces = []
 for corner in (7 * x + y for x in range(6) for y in range(6)):
     faces += [(corner, corner + 7, corner + 8), (corner, corner + 8, corner + 1)]
-mesh = modules["curvature.mesh"].TriMesh.from_arrays(grid, faces)
+mesh = modules["curvature.tri_mesh"].TriMesh.from_arrays(grid, faces)
 mean = modules["curvature.field"].principal_curvatures(mesh).mean[24]
 print("blender:", sorted(set(BLENDER) & set(sys.modules)))
 print("modules:", " ".join(sorted(names)))
@@ -67,9 +67,9 @@ def test_every_module_works_where_blender_is_not() -> None:
     assert {
         "errors",
         "curvature.field",
-        "curvature.mesh",
+        "curvature.clean",
         "reflectance.lut",
-        "reflectance.ring",
+        "reflectance.ring_model",
     } <= set(told["modules"].split())
     # The lobe's edges are more than 5 sigma away: what is left is exp(-sigma^2 / 2) cos(0).
     assert told["reflectance"] == "0.9560"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world's light on the skin: against theory, Cycles, and EEVEE's own Diffuse BSDF."""
+"""The world's light on translucent surfaces: theory, Cycles, and EEVEE's own Diffuse BSDF."""
 
 from __future__ import annotations
 
@@ -8,21 +8,24 @@ import math
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 from rig import Rig, cdrf_node, diffuse_material
 from tolerances import WORLD_CYCLES, WRITTEN
 
 from cdrf_addon import compat, ids
 from cdrf_addon.blender import state
-from cdrf_addon.blender.world import capture as world_capture
-from cdrf_addon.blender.world import light as world
+from cdrf_addon.blender.world.capture import capture
+from cdrf_addon.blender.world.stamps import stamped
+from cdrf_addon.blender.world.surface import is_animated
 from cdrf_addon.core.errors import SceneError
 from cdrf_addon.core.reflectance.environment import band_factors, lit_by, panorama_directions
-from cdrf_addon.core.reflectance.models import PROFILE, RING, profile, ring, sphere
+from cdrf_addon.core.reflectance.model import PROFILE, RING, ring, sphere
+from cdrf_addon.core.reflectance.profile import profile
 
 
 @pytest.fixture
 def rig(rig: Rig) -> Rig:
-    """The world's light is smooth: fewer pixels say as much."""
+    """The world's light is smooth: fewer pixels show as much."""
     rig.scene.render.resolution_x = rig.scene.render.resolution_y = 64
     return rig
 
@@ -60,12 +63,12 @@ def white(rig: Rig) -> bpy.types.Object:
     return ball
 
 
-def due(rig: Rig, item: bpy.types.Object) -> list[str]:
-    return state.reasons_to_update(item, rig.scene, bpy.context.view_layer)
+def due(rig: Rig, obj: bpy.types.Object) -> list[str]:
+    return state.reasons_to_update(obj, rig.scene, bpy.context.view_layer)
 
 
-def kinds(item: bpy.types.Object) -> list[str]:
-    return [node.bl_idname for node in cdrf_node(item).node_tree.nodes]
+def kinds(obj: bpy.types.Object) -> list[str]:
+    return [node.bl_idname for node in cdrf_node(obj).node_tree.nodes]
 
 
 @pytest.mark.smoke
@@ -87,7 +90,7 @@ def test_white_world_is_one_and_followed(rig: Rig) -> None:
 def test_no_node_for_a_black_or_missing_world(rig: Rig) -> None:
     ball = white(rig)
     group = cdrf_node(ball).node_tree
-    assert ids.WORLD_NODE not in group.nodes and world.stamped(group) is None
+    assert ids.WORLD_NODE not in group.nodes and stamped(group) is None
     assert due(rig, ball) == []
     plain(rig)
     assert any("world" in line for line in due(rig, ball))
@@ -105,7 +108,7 @@ def test_gradient_sky_is_filtered_by_every_model(rig: Rig) -> None:
     picture(rig, 0.5 + 0.3 * z * np.array([1.0, 0.5, -1.0]) + 0.05 * (3.0 * z**2 - 1.0))
     ball = white(rig)
     material = ball.data.materials[0]
-    light = world.stamped(cdrf_node(ball).node_tree)
+    light = stamped(cdrf_node(ball).node_tree)
     assert light is not None and light.environment.sun is None
     normals, covered = rig.normals(ball)
     material.cdrf.sigma0_ratio = (1.0, 0.5, 0.1)
@@ -149,7 +152,7 @@ def test_against_cycles_and_the_diffuse_bsdf(rig: Rig, sky) -> None:
     picture(rig, sky())
     ball = white(rig)
     ball.data.materials[0].cdrf.sigma0 = 0.0
-    light = world.stamped(cdrf_node(ball).node_tree)
+    light = stamped(cdrf_node(ball).node_tree)
     assert light is not None and light.environment.sun is not None
     ours = rig.render()
     ball.data.materials[0] = diffuse_material()
@@ -180,9 +183,9 @@ def test_worlds_are_rendered_once_and_their_strength_is_followed(rig: Rig, monke
 
     def counting(*arguments):
         counted.append("x")
-        return world_capture.capture(*arguments)
+        return capture(*arguments)
 
-    monkeypatch.setattr(world, "capture", counting)
+    monkeypatch.setattr("cdrf_addon.blender.world.light.capture", counting)
     before = {kind: len(getattr(bpy.data, kind)) for kind in ("scenes", "worlds", "cameras")}
     ball = white(rig)
     assert len(counted) == 1
@@ -212,9 +215,9 @@ def test_without_cycles_the_lights_still_work(rig: Rig, monkeypatch, capfd) -> N
     def refuse(*_arguments):
         raise SceneError("The world's light could not be read, as Cycles is switched off: enable")
 
-    monkeypatch.setattr(world, "capture", refuse)
+    monkeypatch.setattr("cdrf_addon.blender.world.light.capture", refuse)
     ball = white(rig)
-    assert world.stamped(cdrf_node(ball).node_tree) is None
+    assert stamped(cdrf_node(ball).node_tree) is None
     assert "Sun" in cdrf_node(ball).node_tree.nodes
     assert any("world" in line for line in due(rig, ball))
     assert "enable" in capfd.readouterr().out
@@ -225,7 +228,7 @@ def test_a_saved_file_knows_its_world(rig: Rig, tmp_path, monkeypatch) -> None:
     rig.scene.world.node_tree.nodes["HDRI"].image.pack()
     ball = white(rig)
     name = ball.name
-    before = world.stamped(cdrf_node(ball).node_tree)
+    before = stamped(cdrf_node(ball).node_tree)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "world.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "world.blend"))
     ball = bpy.data.objects[name]
@@ -235,16 +238,38 @@ def test_a_saved_file_knows_its_world(rig: Rig, tmp_path, monkeypatch) -> None:
     def refuse(*_arguments):
         raise AssertionError("rendered again")
 
-    monkeypatch.setattr(world, "capture", refuse)
+    monkeypatch.setattr("cdrf_addon.blender.world.light.capture", refuse)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    after = world.stamped(cdrf_node(ball).node_tree)
+    after = stamped(cdrf_node(ball).node_tree)
     assert before is not None and after is not None
     assert np.array_equal(before.environment.harmonics, after.environment.harmonics)
     assert after.world == scene.world
 
 
+def test_a_flat_mesh_is_lit_by_a_pictures_sun_alone(rig: Rig) -> None:
+    """Without a light of the scene nothing but the sun depends on the variance."""
+    picture(rig, sunny())
+    bpy.ops.mesh.primitive_plane_add(size=1.0)
+    plane = bpy.context.object
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    node = cdrf_node(plane)
+    node.inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
+    light = stamped(node.node_tree)
+    assert light is not None and light.environment.sun is not None
+    sun = light.environment.sun
+    # Turned halfway from the sun to the camera, so that both see it.
+    normal = (Vector(sun.direction) + Vector((0.0, -1.0, 0.0))).normalized()
+    plane.rotation_euler = normal.to_track_quat("Z", "Y").to_euler()
+    expected = lit_by(light.environment.harmonics, tuple(normal), np.ones((3, 3)))
+    expected = expected + np.array(sun.radiance) * normal.dot(Vector(sun.direction))
+    pixels = rig.render()
+    found = pixels[pixels[..., 3] > 0.999][:, :3]
+    assert np.abs(found / expected - 1.0).max() <= 2e-3
+    assert due(rig, plane) == []
+
+
 def test_the_camera_may_see_another_world(rig: Rig) -> None:
-    """Light Path > Is Camera Ray hides the light from the camera, not from the skin."""
+    """Light Path > Is Camera Ray hides the light from the camera, not from the surface."""
     tree = rig.scene.world.node_tree
     path = tree.nodes.new("ShaderNodeLightPath")
     mix = tree.nodes.new("ShaderNodeMix")
@@ -255,7 +280,7 @@ def test_the_camera_may_see_another_world(rig: Rig) -> None:
     tree.links.new(mix.outputs[2], background(rig).inputs["Color"])
     background(rig).inputs["Strength"].default_value = 1.0
     ball = white(rig)
-    light = world.stamped(cdrf_node(ball).node_tree)
+    light = stamped(cdrf_node(ball).node_tree)
     assert light is not None
     white_in = lit_by(light.environment.harmonics, (0.0, 0.0, 1.0), np.ones((3, 3)))
     assert white_in == pytest.approx((0.5,) * 3, rel=1e-3)
@@ -317,14 +342,14 @@ def test_a_turned_picture_is_followed(rig: Rig, kind: str) -> None:
     turn.inputs["Rotation"].default_value = (0.1, 0.2, 0.3)
     ball = white(rig)
     ball.data.materials[0].cdrf.sigma0 = 0.2
-    light = world.stamped(cdrf_node(ball).node_tree)
+    light = stamped(cdrf_node(ball).node_tree)
     assert light is not None and light.mapping == turn.name and light.environment.sun is not None
     for frame, angles in ((1, (0.0, 0.0, 0.0)), (3, (0.8, -1.4, 4.4))):
         turn.inputs["Rotation"].default_value = angles
         turn.inputs["Rotation"].keyframe_insert("default_value", frame=frame)
     rig.scene.frame_set(2)
     assert turn.inputs["Rotation"].default_value[2] == pytest.approx(2.2)
-    assert due(rig, ball) == [] and not world.is_animated(rig.scene.world)
+    assert due(rig, ball) == [] and not is_animated(rig.scene.world)
     group = cdrf_node(ball).node_tree
     assert all(curve.driver.is_simple_expression for curve in group.animation_data.drivers)
     followed = rig.render()
@@ -336,7 +361,7 @@ def test_a_turned_picture_is_followed(rig: Rig, kind: str) -> None:
     tree.links.new(same.outputs["Vector"], tree.nodes["HDRI"].inputs["Vector"])
     assert any("world" in line for line in due(rig, ball))
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    light = world.stamped(cdrf_node(ball).node_tree)
+    light = stamped(cdrf_node(ball).node_tree)
     assert light is not None and not light.mapping
     assert "ShaderNodeMapping" not in kinds(ball)
     fresh = rig.render()

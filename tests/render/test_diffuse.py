@@ -196,8 +196,8 @@ def test_lamps_scaled_to_nothing_are_dark(rig: Rig) -> None:
 
 def collection(*items: bpy.types.Object, name: str = "Group") -> bpy.types.Collection:
     found = bpy.data.collections.new(name)
-    for item in items:
-        found.objects.link(item)
+    for obj in items:
+        found.objects.link(obj)
     return found
 
 
@@ -216,11 +216,11 @@ def assert_as_diffuse(rig: Rig, items: list[bpy.types.Object]) -> NDArray[np.flo
     material.cdrf.sigma0 = 0.0
     cdrf_node(items[0]).inputs["Base Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     ours = rig.render()
-    for item in items:
-        item.data.materials[0] = diffuse_material()
+    for obj in items:
+        obj.data.materials[0] = diffuse_material()
     theirs = rig.render()
-    for item in items:
-        item.data.materials[0] = material
+    for obj in items:
+        obj.data.materials[0] = material
     peaks = theirs[..., :3].max(axis=(0, 1))
     error = np.abs(ours - theirs)[..., :3].max(axis=(0, 1)) / np.maximum(peaks, 1e-3)
     print(f"peaks {peaks}, worst {error}")
@@ -264,7 +264,7 @@ def test_light_linking_is_heeded_by_each_object(rig: Rig) -> None:
         [False, True, True],
     ]
 
-    # An object that says nothing, as a new one does, receives every light that some object does.
+    # An object without the property, such as a new one, receives every light that some object does.
     del right[ids.UNLIT_KEY]
     more = rig.render()
     assert more[:, middle:, 0].max() > 0.1

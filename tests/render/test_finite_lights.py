@@ -50,11 +50,11 @@ def path_traced(rig: Rig, ball: bpy.types.Object, seed: int) -> np.ndarray:
     scene.cycles.max_bounces = 0
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
     scene.cycles.sample_clamp_direct = scene.cycles.light_sampling_threshold = 0.0
-    skin, ball.data.materials[0] = ball.data.materials[0], diffuse_material()
+    translucent, ball.data.materials[0] = ball.data.materials[0], diffuse_material()
     try:
         return rig.render()
     finally:
-        ball.data.materials[0] = skin
+        ball.data.materials[0] = translucent
         scene.render.engine = kept
 
 

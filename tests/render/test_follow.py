@@ -52,9 +52,9 @@ def assert_lit_from(lit: Lit, direction: np.ndarray, energy: float = 1.0) -> Non
     assert np.abs(error).max() <= WRITTEN.worst * max(energy, 1.0)
 
 
-def axis_of(item: bpy.types.Object) -> np.ndarray:
+def axis_of(obj: bpy.types.Object) -> np.ndarray:
     bpy.context.view_layer.update()
-    return np.array(item.matrix_world)[:3, 2]
+    return np.array(obj.matrix_world)[:3, 2]
 
 
 @pytest.mark.smoke
@@ -179,7 +179,7 @@ def test_appended_material_brings_its_lights(lit: Lit, tmp_path: Path) -> None:
         wanted.objects = [lit_name for lit_name in source.objects if "sphere" in lit_name.lower()]
     ball = wanted.objects[0]
     fresh.scene.collection.objects.link(ball)
-    lamp = next(item for item in bpy.data.objects if item.type == "LIGHT")
+    lamp = next(obj for obj in bpy.data.objects if obj.type == "LIGHT")
     fresh.scene.collection.objects.link(lamp)
     bpy.context.view_layer.update()
     assert np.allclose(axis_of(lamp), direction, atol=1e-6)

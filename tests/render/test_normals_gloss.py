@@ -15,7 +15,8 @@ from cdrf_addon import compat, ids
 from cdrf_addon.blender import state
 from cdrf_addon.blender.material import specular as gloss
 from cdrf_addon.core.reflectance.detail import detail_left
-from cdrf_addon.core.reflectance.models import PROFILE, profile
+from cdrf_addon.core.reflectance.model import PROFILE
+from cdrf_addon.core.reflectance.profile import profile
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 FROM_THE_SIDE = (math.radians(50.0), 0.0, math.radians(70.0))

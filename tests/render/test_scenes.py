@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One skin seen in several ways: instances of other sizes, two view layers, two scenes."""
+"""A translucent material seen in several ways: sizes of instances, view layers, scenes."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from tolerances import WRITTEN
 from cdrf_addon import ids
 from cdrf_addon.blender import setup, state
 from cdrf_addon.blender.material.lighting import lit_elsewhere
-from cdrf_addon.blender.shader import group as shader
-from cdrf_addon.blender.shader.shadows import choose
+from cdrf_addon.blender.material.shadow_choice import choose_shadows
+from cdrf_addon.blender.shader.bits import light_bits
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 Array = NDArray[np.float64]
@@ -54,10 +54,10 @@ def white_ball(rig: Rig, **place: float) -> bpy.types.Object:
     return ball
 
 
-def reasons(item: bpy.types.Object) -> str:
+def reasons(obj: bpy.types.Object) -> str:
     bpy.context.view_layer.update()
     scene, layer = bpy.context.scene, bpy.context.view_layer
-    return " ".join(state.reasons_to_update(item, scene, layer))
+    return " ".join(state.reasons_to_update(obj, scene, layer))
 
 
 def error(picture: Array, suns: list[str], x: float = 0.0, radius: float = RADIUS) -> float:
@@ -141,7 +141,7 @@ def test_each_view_layer_has_its_own_lights(rig: Rig) -> None:
     # A flag that changes is followed without a click.
     second.layer_collection.children["Rim"].exclude = False
     assert error(layer_picture(rig, "Second"), ["Key", "Rim"]) <= WRITTEN.worst
-    # Shown nowhere else, the skin needs no such driver.
+    # Shown nowhere else, the material needs no such driver.
     second.layer_collection.children["Stage"].exclude = True
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     assert [node.name for node in cdrf_node(ball).node_tree.nodes if ids.LIGHT_KEY in node] == [
@@ -178,7 +178,7 @@ def test_another_scene_does_not_take_the_lights_away(rig: Rig, capfd) -> None:
     assert error(rig.render(), ["Rim"]) <= WRITTEN.worst
     bpy.context.window.scene = rig.scene = first
     assert reasons(ball) == "" and np.array_equal(rig.render(), here)
-    # Make Translucent, on the object that both show, takes it over and says so.
+    # Make Translucent, on the object that both show, takes it over and reports so.
     bpy.context.window.scene = second
     second.collection.objects.link(ball)
     second.collection.objects.unlink(copy)
@@ -224,7 +224,7 @@ def test_a_linked_character_is_lit_by_this_file(rig: Rig, tmp_path: Path) -> Non
     )
     bpy.data.objects.remove(instance)
     bpy.context.view_layer.update()
-    hero = next(item for item in bpy.context.view_layer.objects if item.type == "MESH")
+    hero = next(obj for obj in bpy.context.view_layer.objects if obj.type == "MESH")
     assert hero.override_library is not None and hero.data.library is not None
     assert "lights of its own file" in reasons(hero)
     bpy.ops.object.select_all(action="DESELECT")
@@ -283,23 +283,26 @@ def test_shadows_do_not_depend_on_which_view_layer_is_open(rig: Rig) -> None:
     own.objects.link(hat)
     bare = rig.scene.view_layers.new("Bare")
     bare.layer_collection.children["Hats"].exclude = True
-    skin = ball.data.materials[0]
-    assert choose(skin, rig.scene.view_layers[0]).cast and choose(skin, bare).cast
+    material = ball.data.materials[0]
+    assert (
+        choose_shadows(material, rig.scene.view_layers[0]).cast
+        and choose_shadows(material, bare).cast
+    )
     own.hide_render = True
     hat.hide_render = True
-    assert not choose(skin, bare).cast
+    assert not choose_shadows(material, bare).cast
 
 
 def test_a_renamed_scene_keeps_its_skins(rig: Rig) -> None:
     sun(rig, "Key")
     ball = white_ball(rig)
-    skin = ball.data.materials[0]
+    material = ball.data.materials[0]
     other = bpy.data.scenes.new("Other")
     other.collection.objects.link(ball)
     home, name = rig.scene, rig.scene.name
-    assert lit_elsewhere(skin, home) is None and lit_elsewhere(skin, other) == home
+    assert lit_elsewhere(material, home) is None and lit_elsewhere(material, other) == home
     home.name = "Renamed"
-    assert lit_elsewhere(skin, home) is None and lit_elsewhere(skin, other) == home
+    assert lit_elsewhere(material, home) is None and lit_elsewhere(material, other) == home
     home.name = name
     bpy.data.scenes.remove(other)
 
@@ -325,19 +328,19 @@ def test_lights_never_share_a_place_in_the_objects_property(rig: Rig) -> None:
     first, second = sun(rig, "Key"), sun(rig, "Rim")
     ball, other = white_ball(rig, x=-0.75), rig.sphere(RADIUS)
     other.data.materials.append(ball.data.materials[0])
-    for light, item in ((first, ball), (second, other)):
+    for light, obj in ((first, ball), (second, other)):
         chosen = bpy.data.collections.new(light.name)
-        chosen.objects.link(item)
+        chosen.objects.link(obj)
         light.light_linking.receiver_collection = chosen
     bpy.context.view_layer.update()
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     group = cdrf_node(ball).node_tree
-    assert sorted(shader.light_bits(group).values()) == [0, 1]
+    assert sorted(light_bits(group).values()) == [0, 1]
     # As after appending what another file numbered by itself.
     for node in group.nodes:
         if ids.BIT_KEY in node:
             node[ids.BIT_KEY] = 0
     assert "another place" in reasons(ball)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    assert len(set(shader.light_bits(cdrf_node(ball).node_tree).values())) == 2
+    assert len(set(light_bits(cdrf_node(ball).node_tree).values())) == 2
     assert reasons(ball) == ""

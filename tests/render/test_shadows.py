@@ -55,18 +55,18 @@ def scene_of(rig: Rig, count: int) -> tuple[bpy.types.Object, bpy.types.Object]:
     # What the camera sees of it must not hide the sphere.
     bar.visible_camera = False
     ball = rig.sphere(subdivisions=6)
-    make_white_skin(ball, SIGMA)
+    make_white(ball, SIGMA)
     return ball, bar
 
 
-def make_white_skin(item: bpy.types.Object, sigma0: float) -> None:
+def make_white(obj: bpy.types.Object, sigma0: float) -> None:
     """Set up the selected object, white and without coloured edges."""
     bpy.context.view_layer.update()
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    material = item.data.materials[0]
+    material = obj.data.materials[0]
     material.cdrf.shadow_edges = False
     material.cdrf.sigma0 = sigma0
-    cdrf_node(item).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
+    cdrf_node(obj).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
 
 
 def points() -> tuple[Array, NDArray[np.bool_]]:
@@ -135,8 +135,8 @@ def test_two_and_three_lights_have_their_own_shadows(rig: Rig, count: int) -> No
 
 def group_of(*items: bpy.types.Object) -> bpy.types.Collection:
     found = bpy.data.collections.new("Linked")
-    for item in items:
-        found.objects.link(item)
+    for obj in items:
+        found.objects.link(obj)
     return found
 
 
@@ -146,7 +146,7 @@ def test_a_light_not_received_leaves_the_others_shadows_alone(rig: Rig) -> None:
     ball, bar = scene_of(rig, 2)
     other = rig.link(ball.data)
     other.location = (50.0, 0.0, 0.0)
-    second = next(item for item in rig.scene.objects if item.name.startswith("Sun."))
+    second = next(obj for obj in rig.scene.objects if obj.name.startswith("Sun."))
     second.light_linking.receiver_collection = group_of(other)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     assert ids.UNLIT_KEY in ball and ids.UNLIT_KEY not in other
@@ -159,7 +159,7 @@ def test_a_light_not_received_leaves_the_others_shadows_alone(rig: Rig) -> None:
 def test_shadow_linking(rig: Rig) -> None:
     """The bar does not block the light: neither its shadow nor the coloured edge of one is seen."""
     ball, bar = scene_of(rig, 1)
-    sun = next(item for item in rig.scene.objects if item.type == "LIGHT")
+    sun = next(obj for obj in rig.scene.objects if obj.type == "LIGHT")
     material = ball.data.materials[0]
     material.cdrf.shadow_edges = True
     blockers = sun.light_linking.blocker_collection = group_of(bar)
@@ -189,7 +189,7 @@ def test_the_world_does_not_brighten_a_shadow(rig: Rig) -> None:
     background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     background.inputs["Strength"].default_value = 0.2
     _, bar = scene_of(rig, 1)
-    # An even world sends its strength to all of a white skin, in shadow and out of it.
+    # An even world sends its strength to all of a white surface, in shadow and out of it.
     off = errors(rig, bar, 1, world=0.2)
     assert np.sqrt((off**2).mean()) <= SHADOW_WORLD.rms
 
@@ -206,7 +206,7 @@ def bald_head(rig: Rig, count: int) -> bpy.types.Object:
     """A unit sphere under the first HAT_SUNS, translucent before it has a hat."""
     light_from(rig, directions(count, HAT_SUNS))
     head = rig.sphere(subdivisions=6)
-    make_white_skin(head, HAT_SIGMA)
+    make_white(head, HAT_SIGMA)
     return head
 
 
@@ -220,7 +220,7 @@ def hat() -> bpy.types.Object:
 
 
 def below_the_brim(rig: Rig, brim: bpy.types.Object, count: int, *, shadow: bool = True) -> Array:
-    """Differences from theory over the skin that the camera sees under the hat."""
+    """Differences from theory over the surface that the camera sees under the hat."""
     towards = directions(count, HAT_SUNS)
     wanted, clear = expected(brim, towards, HAT_SIGMA, HAT_EDGE)
     places, _ = points()

@@ -14,7 +14,8 @@ from scipy.integrate import quad
 from tolerances import FOUR_LIGHTS, SHADER, WRITTEN, Bound
 
 from cdrf_addon.core.reflectance.finite_light import SPHERE_GAIN, finite_light
-from cdrf_addon.core.reflectance.models import PROFILE, RING, SPHERE, profile, ring, sphere
+from cdrf_addon.core.reflectance.model import PROFILE, RING, SPHERE, ring, sphere
+from cdrf_addon.core.reflectance.profile import profile
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 SIGMAS = (0.0, 0.01, 0.05, 0.1, 0.3, 1.0, 3.0, 30.0)

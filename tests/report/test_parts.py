@@ -17,7 +17,7 @@ from report.substances import PRESET_OF, profile_of, substance
 from report.timing import split
 from stability import EXTREMES
 
-from cdrf_addon.core.reflectance.models import SKIN_PROFILE
+from cdrf_addon.core.reflectance.profile import SKIN_PROFILE
 from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
 
 TESTS = Path(__file__).resolve().parents[1]

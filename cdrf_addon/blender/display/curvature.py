@@ -11,18 +11,10 @@ import bpy
 from ... import ids
 from ...core.errors import SceneError
 from ..material.install import cdrf_node, skin_output, skin_socket
-from ..nodes.groups import display_group
+from ..nodes.curvature import display_group
 from ..nodes.tree import TreeBuilder
-from ..shader.group import (
-    ATTRIBUTE,
-    CONSTANT,
-    SCALED,
-    curvature_nodes,
-    diffused_node,
-    level_nodes,
-    size_node,
-    stamped_variant,
-)
+from ..shader.curvature import curvature_nodes, diffused_node, level_nodes, size_node
+from ..shader.variant import ATTRIBUTE, CONSTANT, SCALED, stamped_variant
 
 QUANTITIES = {
     "KAPPA": ("Curvature", "Curvedness as measured, whatever its sign: hot where it is sharp"),

@@ -16,7 +16,7 @@ from ... import ids
 from ...compat import ensure_node_tree, set_uses_nodes, uses_nodes
 from ...core.errors import SceneError
 from ..nodes.tree import TreeBuilder
-from ..shader.group import is_shader_group
+from ..shader.variant import is_shader_group
 
 COLOUR_INPUTS = ("Base Color", "Color")
 PLAIN_KEY = "cdrf_was_plain"

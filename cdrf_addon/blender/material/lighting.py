@@ -16,7 +16,7 @@ import bpy
 from ... import ids
 from ..instances import shown_objects
 from ..lights.scene_lights import SceneLight, scene_lights
-from ..shader.group import Source, wired_lights
+from ..shader.wired import Source, wired_lights
 from .install import cdrf_node
 
 

@@ -15,7 +15,7 @@ import bpy
 from ... import ids
 from ..instances import is_instance
 from ..lights.scene_lights import SceneLight
-from ..shader.group import light_bits
+from ..shader.bits import light_bits
 from .install import cdrf_node
 from .lighting import lights_on_skin
 

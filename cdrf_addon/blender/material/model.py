@@ -18,35 +18,40 @@ from ... import ids
 from ...compat import animation_curves, walk_method
 from ...core.errors import ParameterError, SceneError
 from ...core.reflectance.detail import DETAIL_PER_SIGMA0
-from ...core.reflectance.models import (
+from ...core.reflectance.model import (
     DEFAULT_KIND,
     MEASURED,
     PROFILE,
     RING,
-    SKIN_PROFILE,
     SPHERE,
     Model,
-    parse_profile,
-    profile,
     ring,
     sphere,
 )
+from ...core.reflectance.profile import SKIN_PROFILE, parse_profile, profile
 from ...core.scattering.node_radius import sigma0_per_radius
 from ...core.scattering.presets import Preset, in_units
 from ..nodes.tables import ensure_table, find_table, table_of
-from ..shader import group as shader
-from ..shader.shadows import Choice, choose
-from ..world import light as world
+from ..shader.group import ensure_shader_group
+from ..shader.variant import (
+    ShadowChoice,
+    Variant,
+    is_shader_group,
+    stamped_variant,
+    variant_of,
+)
+from ..world.stamps import stamped
 from . import linking
 from .install import cdrf_node, install, require_editable
 from .scattering import Scattering
+from .shadow_choice import choose_shadows
 
 
 def model_key(material: bpy.types.Material) -> str:
     """Key of the model that a material has, or will have once it is translucent."""
     node = cdrf_node(material)
     if node is not None:
-        return shader.stamped_variant(node.node_tree).model
+        return stamped_variant(node.node_tree).model
     return material.cdrf.chosen_model or DEFAULT_KIND
 
 
@@ -118,7 +123,7 @@ def remove_unused() -> None:
     """Delete our shader groups that no material uses, and what only they used."""
     groups = bpy.data.node_groups
     for group in list(groups):
-        if shader.is_shader_group(group) and group.users == 0 and group.library is None:
+        if is_shader_group(group) and group.users == 0 and group.library is None:
             groups.remove(group)
     for group in list(groups):
         role = str(group.get(ids.ROLE_KEY, ""))
@@ -251,15 +256,15 @@ def change_variant(
     ratio: Sequence[float] | None = None,
     model: str | None = None,
     occluded: bool | None = None,
-    shadows: Choice | None = None,
+    shadows: ShadowChoice | None = None,
 ) -> None:
     """Swap a translucent material's shader group for another ratio, model, occlusion or shadows."""
     node = cdrf_node(material)
     if node is None:
         return
-    now = shader.stamped_variant(node.node_tree)
+    now = stamped_variant(node.node_tree)
     channels = node.inputs[ids.SIGMA0_RATIO].default_value if ratio is None else ratio
-    wanted = shader.variant_of(
+    wanted = variant_of(
         tuple(channels),
         now.source,
         now.model if model is None else model,
@@ -279,18 +284,18 @@ def refresh_shadows(material: bpy.types.Material) -> None:
         return
     layer = _view_layer(node.node_tree)
     if layer is not None:
-        change_variant(material, shadows=choose(material, layer))
+        change_variant(material, shadows=choose_shadows(material, layer))
 
 
 def refresh_lights(material: bpy.types.Material) -> None:
     """Give a translucent material's group the lights that its scene has now."""
     node = cdrf_node(material)
     if node is not None and material.is_editable:
-        _install(material, node.node_tree, shader.stamped_variant(node.node_tree))
+        _install(material, node.node_tree, stamped_variant(node.node_tree))
 
 
 def _install(
-    material: bpy.types.Material, group: bpy.types.ShaderNodeTree, wanted: shader.Variant
+    material: bpy.types.Material, group: bpy.types.ShaderNodeTree, wanted: Variant
 ) -> None:
     """Put the variant of a group, with the lights that its scene has now, in the group's place."""
     scene, layer = _scene(group), _view_layer(group)
@@ -299,8 +304,8 @@ def _install(
     lights = linking.material_lights(material, scene, layer)
     wanted = replace(wanted, links=linking.links_of(lights))
     # The world's light as it was at the last Update: a slider must not render anything.
-    light = world.stamped(group)
-    install(material, shader.ensure_shader_group(wanted, scene, lights, light))
+    light = stamped(group)
+    install(material, ensure_shader_group(wanted, scene, lights, light))
     linking.write_unlit()
 
 

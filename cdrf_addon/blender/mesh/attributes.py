@@ -14,9 +14,9 @@ import numpy as np
 
 from ... import ids
 from ...core.curvature.field import Options
-from ...core.curvature.mesh import TriMesh
 from ...core.curvature.summary import VARYING
 from ...core.curvature.topology import edge_lengths
+from ...core.curvature.tri_mesh import TriMesh
 from ...core.errors import MeshError
 
 if TYPE_CHECKING:

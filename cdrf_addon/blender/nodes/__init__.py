@@ -1,2 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Building blocks of node trees; nothing here knows a scene or a material."""
+"""Node groups that only depend on their arguments, and the builder that makes them.
+
+Nothing here reads a scene, a light or a material.
+"""

@@ -1,33 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The coloured edge of a cast shadow: visibility blurred over the surface by each channel's sigma0.
 
-A shadow map answers for the shaded point only, so its neighbours are asked with the Raycast node
-(Blender 5.1 and later), which EEVEE traces in screen space: it knows what the camera sees. It is
-believed only where, at the shaded point itself, it agrees with the shadow map; elsewhere (occluder
-out of view, or taken for thicker than it is) the edge stays as sharp as the light makes it.
+A shadow map gives the visibility of the shaded point only. That of its neighbours comes from the
+Raycast node (Blender 5.1 and later), which EEVEE traces in screen space: it finds what the camera
+sees. Its rays count only where the one at the shaded point agrees with the shadow map. Elsewhere
+(an occluder out of view, or taken for thicker than it is) the edge stays as sharp as the light
+makes it.
 
-The blur is a Gaussian of standard deviation sigma0 in the tangent plane, which on a plane is what
-the sphere's and the ring's model both are. Five rays serve all channels: one per ring of the
-tangent plane, each channel weighing the rings with its own Gaussian's mass.
+The blur is a Gaussian of standard deviation sigma0 in the tangent plane, to which both the sphere
+and the ring model reduce on a plane. Five rays serve all channels: one for each ring of the tangent
+plane, weighted by the mass of the channel's Gaussian in that ring.
+
+Wiring, for rays k = 0 to 4 at P + radius_k (cos a_k T + sin a_k B), a random first angle:
+
+    Raycast along Direction -> Is Hit (1 - Self Hit) = hit_k
+    blurred = 1 - sum over k of mass_k(channel) hit_k
+    |Visibility - (1 - hit_0)| < 1/2 ? blurred : Visibility -> Visibility per channel
 """
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any
 
 import bpy
 
 from ... import ids
-from .tree import TreeBuilder, declare, ensure_group
+from .tree import Operand, Socket, TreeBuilder, declare, ensure_group
 
 VERSION = 1
 
 # Radii of the rings and where their rays go, in units of the widest sigma0.
 BOUNDS = (0.0, 0.15, 0.5, 1.0, 1.6)
 RADII = (0.0, 0.3, 0.75, 1.3, 2.0)
-SPREAD = 0.4  # radii vary by this part from pixel to pixel and sample to sample
+# Radii vary by this part from pixel to pixel and sample to sample.
+SPREAD = 0.4
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 # Much longer than a scene at arm's length; EEVEE clips it to what is in view.
 RAY_LENGTH = 100.0
@@ -38,14 +45,7 @@ ODD_DIRECTION = (0.31, 0.47, 0.83)
 
 
 def edge_group() -> bpy.types.ShaderNodeTree:
-    """Visibility per channel, from one light's visibility at the point.
-
-    Wiring, for rays k = 0 to 4 at P + radius_k (cos a_k T + sin a_k B), a random first angle:
-
-        Raycast along Direction -> Is Hit (1 - Self Hit) = hit_k
-        blurred = 1 - sum over k of mass_k(channel) hit_k
-        |Visibility - (1 - hit_0)| < 1/2 ? blurred : Visibility -> Visibility per channel
-    """
+    """Return the group that blurs a light's visibility at a point, per channel."""
 
     def build(b: TreeBuilder) -> None:
         declare(b.tree, ids.VISIBILITY, default=1.0, tip="Of the light, at the shaded point")
@@ -69,8 +69,8 @@ def edge_group() -> bpy.types.ShaderNodeTree:
     return ensure_group("CDRF Shadow Edge", ids.ROLE_EDGE, VERSION, build)
 
 
-def _hits(b: TreeBuilder, direction: Any, widest: Any) -> list[Any]:
-    """Which rays meet another object, 1 or 0."""
+def _hits(b: TreeBuilder, direction: Operand, widest: Operand) -> list[Socket]:
+    """Return for each ray whether it meets another object, 1 or 0."""
     geometry = b.node("ShaderNodeNewGeometry").outputs
     window = b.node("ShaderNodeTexCoord").outputs["Window"]
     noise = b.node("ShaderNodeTexWhiteNoise", noise_dimensions="3D")
@@ -83,7 +83,7 @@ def _hits(b: TreeBuilder, direction: Any, widest: Any) -> list[Any]:
     bitangent = b.vector("CROSS_PRODUCT", normal, tangent)
     hits = []
     for number, radius in enumerate(RADII):
-        origin: Any = geometry["Position"]
+        origin: Operand = geometry["Position"]
         if radius > 0.0:
             angle = b.math("ADD", turn, number * GOLDEN_ANGLE)
             far = b.math("MULTIPLY", stretch, radius)
@@ -99,15 +99,22 @@ def _hits(b: TreeBuilder, direction: Any, widest: Any) -> list[Any]:
     return hits
 
 
-def _blurred(b: TreeBuilder, hits: list[Any], width: Any, widest: Any) -> Any:
-    """Sum of the hits, weighed with the mass of a Gaussian of that width in each ring."""
+def _blurred(b: TreeBuilder, hits: list[Socket], width: Operand, widest: Operand) -> Socket:
+    """Return the sum of the hits, each weighted by the mass of a Gaussian in its ring.
+
+    Args:
+        b: Builder of the group.
+        hits: What `_hits` returned.
+        width: Standard deviation of the channel's Gaussian.
+        widest: That of the widest channel.
+    """
     ratio = b.math("DIVIDE", width, widest)
     ratio2 = b.math("MAXIMUM", b.math("MULTIPLY", ratio, ratio), NARROWEST)
     beyond = [
         b.math("EXPONENT", b.math("DIVIDE", -0.5 * bound**2, ratio2)) if bound > 0.0 else 1.0
         for bound in BOUNDS
     ]
-    total: Any = b.math("MULTIPLY", beyond[-1], hits[-1])
+    total = b.math("MULTIPLY", beyond[-1], hits[-1])
     for (near, far), hit in zip(pairwise(beyond), hits, strict=False):
         total = b.math("MULTIPLY_ADD", b.math("SUBTRACT", near, far), hit, total)
     return total

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The look-up tables as images, one for each model in use: float, Non-Color, packed."""
+"""The look-up tables as images, one for each model in use: float, Non-Color, packed.
+
+A model's key finds its table again; sigma0 is no part of it.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,16 @@ from numpy.typing import NDArray
 
 from ... import ids
 from ...core.errors import SceneError
-from ...core.reflectance.lut import build_lut
-from ...core.reflectance.models import RING, SPHERE, Model, name_of, ring, sphere
+from ...core.reflectance.environment import bands_of_table
+from ...core.reflectance.lut import DEFAULT_LAYOUT, build_lut
+from ...core.reflectance.model import RING, SPHERE, Model, name_of, ring, sphere
 
 LUT_VERSION = 5
 
 
 @dataclass(frozen=True)
 class Table:
-    """A model's image and what the shader has to know of the model."""
+    """A model's look-up table and what the shader needs of the model."""
 
     image: bpy.types.Image
     key: str
@@ -33,7 +37,7 @@ class Table:
 
 
 def find_table(key: str) -> Table | None:
-    """Return the table of the model with that key if this file holds it."""
+    """Return the table of the model with that key, or None if this file has none."""
     for image in bpy.data.images:
         if (
             image.library is None
@@ -49,7 +53,7 @@ def find_table(key: str) -> Table | None:
 
 
 def adopt_table(key: str) -> None:
-    """Copy a linked file's table of that key into this file, unless it has one."""
+    """Copy a linked file's table of that key into this file, unless the file has its own."""
     if find_table(key) is not None:
         return
     for image in list(bpy.data.images):
@@ -59,10 +63,10 @@ def adopt_table(key: str) -> None:
 
 
 def table_of(key: str) -> Table:
-    """Return the table with that key, made anew where the key says it all.
+    """Return the table with that key; that of the ring or sphere model is made where missing.
 
     Raises:
-        SceneError: The table of a profile or a measurement was deleted.
+        SceneError: The table of a profile or a measurement was deleted; the text names a remedy.
     """
     found = find_table(key)
     if found is not None:
@@ -76,7 +80,7 @@ def table_of(key: str) -> Table:
 
 
 def ensure_table(model: Model) -> Table:
-    """Return a model's packed table, built once per file; sigma0 is no part of it."""
+    """Return a model's packed table, built once per file."""
     found = find_table(model.key)
     if found is not None:
         return found
@@ -93,8 +97,26 @@ def ensure_table(model: Model) -> Table:
     return Table(image, model.key, model.colour, model.moments, model.gain)
 
 
+def bands_image(table: Table) -> bpy.types.Image:
+    """Return the packed table of a model's band factors, made once from its look-up table."""
+    role = f"{ids.ROLE_BANDS} {table.key}"
+    for image in bpy.data.images:
+        if image.library is None and image.get(ids.ROLE_KEY) == role:
+            return image
+    width, height = table.image.size
+    flat = np.empty(width * height * 4, dtype=np.float32)
+    table.image.pixels.foreach_get(flat)
+    values = flat.reshape(height, width, 4)[..., :3].astype(np.float64)
+    bands = bands_of_table(values, DEFAULT_LAYOUT)
+    image = packed_image(f"{ids.BANDS_IMAGE} {name_of(table.key)}", bands)
+    image[ids.ROLE_KEY] = role
+    # Kept in the file even where nothing uses it: that of a measured table cannot be made again.
+    table.image.use_fake_user = True
+    return image
+
+
 def packed_image(name: str, values: NDArray[np.floating]) -> bpy.types.Image:
-    """Make a packed float image of numbers, (height, width, 3) or (height, width, 1)."""
+    """Make a packed float image of numbers, shape (height, width, 3) or (height, width, 1)."""
     height, width = values.shape[:2]
     image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=True)
     # Half precision would cost a factor of four in accuracy (decision 002).

@@ -1,25 +1,36 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small builder for shader node trees: operands in, output socket back, links by socket name."""
+"""Builds shader node trees: operands in, output socket back, links by socket name.
+
+Also finds, makes and rebuilds the node groups whose content never depends on a scene.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
 import bpy
 
 from ... import ids
 
-Operand = "bpy.types.NodeSocket | float | tuple[float, ...]"
+Socket: TypeAlias = bpy.types.NodeSocket
+"""An input or output of a node."""
+Sockets: TypeAlias = Mapping[str, Socket]
+"""A node's inputs or outputs, by name."""
+Value: TypeAlias = float | tuple[float, ...]
+"""A number, vector or colour."""
+Operand: TypeAlias = Socket | Value
+"""What an input takes: an output to link, or a value."""
+
 COLUMN_WIDTH = 190.0
 ROW_HEIGHT = 170.0
 
 
 class TreeBuilder:
-    """Adds nodes to a tree. Every method returns the output socket that carries its result.
+    """Adds nodes to a tree. Arithmetic returns the output socket that carries its result.
 
-    Operands are sockets (linked) or numbers (set as the input's default), so an expression reads
-    like one: ``b.math("SQRT", b.math("MULTIPLY", x, 2.0))``.
+    Operands are sockets (linked) or numbers (set as the input's value), so that the code reads as
+    an expression: ``b.math("SQRT", b.math("MULTIPLY", x, 2.0))``.
     """
 
     def __init__(self, tree: bpy.types.ShaderNodeTree) -> None:
@@ -35,16 +46,26 @@ class TreeBuilder:
         return node
 
     def group(
-        self, tree: bpy.types.ShaderNodeTree, label: str, **operands: Any
+        self, tree: bpy.types.ShaderNodeTree, label: str, **operands: Operand
     ) -> bpy.types.ShaderNode:
-        """Add an instance of a node group; `operands` are keyed by socket name, blanks as ``_``."""
+        """Add an instance of a node group.
+
+        Args:
+            tree: The node group.
+            label: Name and label of the instance.
+            **operands: By name of the input, with ``_`` for a blank.
+        """
         node = self.node("ShaderNodeGroup", label, node_tree=tree)
         for name, operand in operands.items():
             self.feed(node.inputs[name.replace("_", " ")], operand)
         return node
 
-    def feed(self, socket: bpy.types.NodeSocket, operand: Any) -> None:
-        """Link a socket or set a number; refuse an input that Blender would ignore."""
+    def feed(self, socket: Socket, operand: Operand) -> None:
+        """Link an input or set its value.
+
+        Raises:
+            ValueError: Blender ignores this input in the node's present mode.
+        """
         if not socket.enabled:
             raise ValueError(f"{socket.node.name}: input {socket.name} is not used in this mode")
         if isinstance(operand, bpy.types.NodeSocket):
@@ -52,15 +73,15 @@ class TreeBuilder:
         else:
             socket.default_value = operand
 
-    def math(self, operation: str, *operands: Any, clamp: bool = False) -> bpy.types.NodeSocket:
-        """Scalar arithmetic; the Math node's inputs all bear one name, so they go by position."""
+    def math(self, operation: str, *operands: Operand, clamp: bool = False) -> Socket:
+        """Add scalar arithmetic; the Math node's inputs share one name, so they go by position."""
         node = self.node("ShaderNodeMath", operation=operation, use_clamp=clamp)
         for socket, operand in zip(node.inputs, operands, strict=False):
             self.feed(socket, operand)
         return node.outputs["Value"]
 
-    def vector(self, operation: str, *operands: Any, scale: Any = None) -> bpy.types.NodeSocket:
-        """Vector arithmetic; returns the scalar output for DOT_PRODUCT and LENGTH."""
+    def vector(self, operation: str, *operands: Operand, scale: Operand | None = None) -> Socket:
+        """Add vector arithmetic; return the scalar output of DOT_PRODUCT, LENGTH and DISTANCE."""
         node = self.node("ShaderNodeVectorMath", operation=operation)
         for socket, operand in zip(node.inputs, operands, strict=False):
             self.feed(socket, operand)
@@ -69,25 +90,43 @@ class TreeBuilder:
         scalar = operation in {"DOT_PRODUCT", "LENGTH", "DISTANCE"}
         return node.outputs["Value" if scalar else "Vector"]
 
-    def combine(self, x: Any, y: Any, z: Any) -> bpy.types.NodeSocket:
-        """Three scalars to a vector."""
+    def combine(self, x: Operand, y: Operand, z: Operand) -> Socket:
+        """Join three scalars to a vector."""
         node = self.node("ShaderNodeCombineXYZ")
         for name, operand in zip("XYZ", (x, y, z), strict=True):
             self.feed(node.inputs[name], operand)
         return node.outputs["Vector"]
 
-    def separate(self, vector: Any) -> tuple[bpy.types.NodeSocket, ...]:
-        """A vector to its three scalars."""
+    def separate(self, vector: Operand) -> tuple[Socket, ...]:
+        """Split a vector into its three scalars."""
         node = self.node("ShaderNodeSeparateXYZ")
         self.feed(node.inputs["Vector"], vector)
         return tuple(node.outputs[name] for name in "XYZ")
 
-    def ends(self) -> tuple[Any, Any]:
-        """Add the group's input and output; return the sockets that they offer."""
+    def combine_channels(self, channels: Mapping[str, Operand]) -> Socket:
+        """Join the channels "R", "G" and "B" to a vector."""
+        return self.combine(channels["R"], channels["G"], channels["B"])
+
+    def separate_channels(self, vector: Operand) -> dict[str, Socket]:
+        """Split a vector into the channels "R", "G" and "B"."""
+        return dict(zip("RGB", self.separate(vector), strict=True))
+
+    def ends(self) -> tuple[Sockets, Sockets]:
+        """Add the group's input and output nodes; return the sockets that they offer."""
         return self.node("NodeGroupInput").outputs, self.node("NodeGroupOutput").inputs
 
-    def look_up(self, image: bpy.types.Image, label: str, *place: Any) -> Any:
-        """Read an image by tube projection at x, y, z; return the outputs Red, Green and Blue."""
+    def look_up(
+        self, image: bpy.types.Image, label: str, x: Operand, y: Operand, z: Operand
+    ) -> Sockets:
+        """Read an image by tube projection; return the outputs Red, Green and Blue.
+
+        Args:
+            image: The look-up table.
+            label: Name and label of the texture node.
+            x: Across the tube, 0 to 1.
+            y: Across the tube, 0 to 1.
+            z: Along the tube: the row, 0 to 1.
+        """
         texture = self.node(
             "ShaderNodeTexImage",
             label,
@@ -96,7 +135,7 @@ class TreeBuilder:
             interpolation="Linear",
             extension="EXTEND",
         )
-        self.feed(texture.inputs["Vector"], self.combine(*place))
+        self.feed(texture.inputs["Vector"], self.combine(x, y, z))
         parts = self.node("ShaderNodeSeparateColor")
         self.feed(parts.inputs["Color"], texture.outputs["Color"])
         return parts.outputs
@@ -110,7 +149,7 @@ class TreeBuilder:
 
         def column(name: str) -> int:
             if name not in depth:
-                depth[name] = 0  # a cycle cannot occur in a shader tree; this only guards recursion
+                depth[name] = 0  # ends the recursion of a cycle, which no shader tree has
                 depth[name] = max((column(source) + 1 for source in sources[name]), default=0)
             return depth[name]
 
@@ -123,7 +162,7 @@ class TreeBuilder:
 
 
 def find_group(role: str, name: str) -> bpy.types.ShaderNodeTree | None:
-    """Find a local node group by the role stamped on it, preferring the one still so named."""
+    """Find a local node group by the role stamped on it; prefer the one that still has the name."""
     named = bpy.data.node_groups.get(name)
     if named is not None and named.library is None and named.get(ids.ROLE_KEY) == role:
         return named
@@ -136,9 +175,13 @@ def find_group(role: str, name: str) -> bpy.types.ShaderNodeTree | None:
 def ensure_group(
     name: str, role: str, version: int, build: Callable[[TreeBuilder], None]
 ) -> bpy.types.ShaderNodeTree:
-    """Return the static group of that role, rebuilt in place if it is of an older version.
+    """Return the static group of that role, rebuilt in place if it is of another version.
 
-    `build` declares the interface with `declare` and adds the nodes.
+    Args:
+        name: Of a new group.
+        role: Stamped on the group; finds it again, whatever its name by then.
+        version: Of what `build` makes.
+        build: Declares the interface with `declare` and adds the nodes.
     """
     group = find_group(role, name)
     if group is not None and group.get(ids.VERSION_KEY) == version and is_intact(group):
@@ -152,7 +195,7 @@ def ensure_group(
 
 
 def is_intact(tree: bpy.types.ShaderNodeTree) -> bool:
-    """Tell whether nothing that the tree's nodes refer to was deleted (a group, the table)."""
+    """Return whether all that the tree's nodes refer to is there (groups, the look-up table)."""
     for node in tree.nodes:
         if node.type == "GROUP" and (node.node_tree is None or not is_intact(node.node_tree)):
             return False
@@ -177,27 +220,40 @@ def declare(
     kind: str = "Float",
     *,
     output: bool = False,
-    default: Any = None,
+    default: Value | None = None,
     low: float | None = None,
     high: float | None = None,
     subtype: str = "",
     hide_value: bool = False,
     tip: str = "",
 ) -> None:
-    """Declare a socket of a group's interface unless it is there already."""
+    """Declare a socket of a group's interface unless it is there already.
+
+    Args:
+        tree: The group.
+        name: Of the socket.
+        kind: What follows "NodeSocket" in Blender's name of the type.
+        output: An output in place of an input.
+        default: Value of an unconnected input.
+        low: Least value that an artist can enter.
+        high: Greatest value that an artist can enter.
+        subtype: Blender's unit, such as "DISTANCE".
+        hide_value: Whether an unconnected input shows no field.
+        tip: Tooltip.
+    """
     side = "OUTPUT" if output else "INPUT"
-    for item in tree.interface.items_tree:
-        if item.item_type == "SOCKET" and item.in_out == side and item.name == name:
+    for socket in tree.interface.items_tree:
+        if socket.item_type == "SOCKET" and socket.in_out == side and socket.name == name:
             return
-    item = tree.interface.new_socket(
+    socket = tree.interface.new_socket(
         name, in_out=side, socket_type=f"NodeSocket{kind}", description=tip
     )
     if subtype:
-        item.subtype = subtype
-    item.hide_value = hide_value
+        socket.subtype = subtype
+    socket.hide_value = hide_value
     if low is not None:
-        item.min_value = low
+        socket.min_value = low
     if high is not None:
-        item.max_value = high
+        socket.max_value = high
     if default is not None:
-        item.default_value = default
+        socket.default_value = default

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world's light: what it is, and how it is captured."""
+"""The light of a world: read, fingerprinted, captured, and noted on shader groups."""

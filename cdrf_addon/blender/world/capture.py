@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders a world alone, all around, and sums it up as harmonics.
+"""Renders a world alone, all around, and projects it on harmonics.
 
-By Cycles, whose panoramic camera every supported Blender has and which needs no graphics card; 256
-by 128 pixels take a second or two. A copy is rendered, changed so that it is seen as EEVEE sees it:
+Cycles renders it: every supported Blender has its panoramic camera, and it needs no graphics card.
+256 by 128 pixels take a second or two. A copy is rendered, changed to send what EEVEE takes of it:
 
 * pictures are averaged first, as samples would miss the sun of an HDRI or hit it by chance;
-* rays are diffuse ones, whatever the world shows to the camera (Light Path);
-* the disc of a Sky Texture's sun is left out, as EEVEE does.
+* Light Path nodes answer as for diffuse rays, whatever the world shows to the camera;
+* a Sky Texture has no sun disc, as in EEVEE.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ DIFFUSE_RAY = "Is Diffuse Ray"
 
 
 def capture(world: bpy.types.World, background: str, mapping: str = "") -> Environment:
-    """Render a world and project it.
+    """Render a world and project it on harmonics.
 
     Args:
-        world: Stays as it is.
+        world: The world; it is not changed.
         background: Name of the Background node whose strength is a factor of its own, or "".
         mapping: Name of the Mapping node whose rotation is left to the shader, or "".
 
@@ -51,14 +51,14 @@ def capture(world: bpy.types.World, background: str, mapping: str = "") -> Envir
             copy.node_tree.nodes[mapping].inputs["Rotation"].default_value = (0.0, 0.0, 0.0)
         with _stage(copy) as scene:
             picture = _render(scene)
-    # The threshold is one of the world as it shines now.
+    # The threshold applies to the world with its present strength.
     threshold = world.sun_threshold / (strength if strength > 0.0 else 1.0)
     return project(picture, sun_threshold=threshold)
 
 
 @contextmanager
 def _copy(world: bpy.types.World) -> Iterator[bpy.types.World]:
-    """A copy of a world with its groups and pictures, prepared; removed afterwards."""
+    """Yield a copy of a world with its groups and pictures, prepared; remove it afterwards."""
     made: list[tuple[bpy.types.bpy_prop_collection, bpy.types.ID]] = []
     copy = world.copy()
     copy.animation_data_clear()
@@ -70,12 +70,12 @@ def _copy(world: bpy.types.World) -> Iterator[bpy.types.World]:
         yield copy
     finally:
         bpy.data.worlds.remove(copy)
-        for owner, item in made:
-            owner.remove(item)
+        for owner, data in made:
+            owner.remove(data)
 
 
 def _freeze(tree: bpy.types.ShaderNodeTree) -> None:
-    """Keep the values of this frame, without what would animate them."""
+    """Keep the values of this frame and drop their animation."""
     tree.animation_data_clear()
 
 
@@ -83,6 +83,12 @@ def _prepare(
     tree: bpy.types.ShaderNodeTree,
     made: list[tuple[bpy.types.bpy_prop_collection, bpy.types.ID]],
 ) -> None:
+    """Change a copied tree to send what EEVEE takes of it.
+
+    Args:
+        tree: Of a copied world, or a copied group in it.
+        made: Takes what is created, and the collection to remove it from.
+    """
     for node in list(tree.nodes):
         if node.type == "GROUP" and node.node_tree is not None:
             node.node_tree = node.node_tree.copy()
@@ -103,7 +109,7 @@ def _prepare(
 
 
 def _as_diffuse(tree: bpy.types.ShaderNodeTree, node: bpy.types.ShaderNode) -> None:
-    """Put constants in place of a Light Path node: this is a diffuse ray."""
+    """Replace the outputs of a Light Path node by constants: a diffuse ray."""
     for output in node.outputs:
         value = float(output.name == DIFFUSE_RAY)
         for link in list(output.links):
@@ -113,7 +119,7 @@ def _as_diffuse(tree: bpy.types.ShaderNodeTree, node: bpy.types.ShaderNode) -> N
 
 
 def _reduced(image: bpy.types.Image | None) -> bpy.types.Image | None:
-    """A picture averaged to PICTURE_WIDTH; None where it is small enough or cannot be read."""
+    """Return a picture averaged to PICTURE_WIDTH; None if it is small enough or cannot be read."""
     if image is None or image.source not in {"FILE", "GENERATED"}:
         return None
     width, height = image.size
@@ -142,10 +148,10 @@ def _reduced(image: bpy.types.Image | None) -> bpy.types.Image | None:
 
 @contextmanager
 def _stage(world: bpy.types.World) -> Iterator[bpy.types.Scene]:
-    """A scene with nothing but a world and a camera that sees all of it."""
+    """Yield a scene with nothing but a world and a camera that sees all of it."""
     scene = bpy.data.scenes.new("CDRF World")
     camera = bpy.data.cameras.new("CDRF World")
-    item = bpy.data.objects.new("CDRF World", camera)
+    eye = bpy.data.objects.new("CDRF World", camera)
     try:
         try:
             scene.render.engine = "CYCLES"
@@ -155,13 +161,13 @@ def _stage(world: bpy.types.World) -> Iterator[bpy.types.Scene]:
                 "Render Engine (Edit > Preferences > Add-ons), then Update."
             ) from error
         set_equirectangular(camera)
-        item.rotation_euler = (math.pi / 2.0, 0.0, 0.0)
-        scene.collection.objects.link(item)
-        scene.world, scene.camera = world, item
+        eye.rotation_euler = (math.pi / 2.0, 0.0, 0.0)
+        scene.collection.objects.link(eye)
+        scene.world, scene.camera = world, eye
         _set_up(scene)
         yield scene
     finally:
-        bpy.data.objects.remove(item)
+        bpy.data.objects.remove(eye)
         bpy.data.cameras.remove(camera)
         bpy.data.scenes.remove(scene)
 
@@ -182,7 +188,7 @@ def _set_up(scene: bpy.types.Scene) -> None:
 
 
 def _render(scene: bpy.types.Scene) -> np.ndarray:
-    """Render to a file, as the result of the artist's last render is not to be read by others."""
+    """Render to a file, so that the artist's last render result stays; (height, width, 3)."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "world.exr"
         scene.render.filepath = str(path)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fields diffused over a surface by implicit heat steps: (M + l^2 / 2 L) x = M b.
+"""Diffuse fields over a surface by implicit heat steps: (M + l^2 / 2 L) x = M b.
 
 M holds the vertex areas, L is the cotangent Laplacian (Pinkall and Polthier 1993), in which needle
-triangles are softened. A step of length l blurs like a kernel of variance l^2 per
-axis. The mean of the field over each component of the surface does not change.
+triangles are softened. A step of length l blurs like a kernel of variance l^2 per axis. The mean of
+the field over each component of the surface does not change.
 
 A field blurred over l does not need triangles much smaller than l: on large meshes, long steps are
 solved on a coarser mesh, whose vertices are the patches of the surface that share a cell of a grid.
@@ -20,25 +20,36 @@ import numpy as np
 
 from ..progress import with_progress
 from .estimators.least_squares import solve
-from .mesh import FLATNESS_LIMIT, repeated_faces
-from .topology import columns, dot, edge_lengths, face_normals, half_cotangents, parts, scatter
+from .topology import (
+    FLATNESS_LIMIT,
+    columns,
+    dot,
+    edge_lengths,
+    face_normals,
+    half_cotangents,
+    parts,
+    repeated_faces,
+    scatter,
+)
 
 if TYPE_CHECKING:
-    from .mesh import CleanMesh, Indices, Points
+    from .clean import CleanMesh
+    from .tri_mesh import Indices, Points
 
 # Half a cotangent beyond this is a needle's (angles below 0.3 degrees): its negative weights are
-# left out and the others end here, as more only stalls the solver. All other triangles keep theirs,
-# also the negative ones: without them a field on sheared triangles is blurred half as far.
+# left out and the others are clamped to this, as more only stalls the solver. All other triangles
+# keep theirs, the negative ones too: without them a field on sheared triangles is blurred half as
+# far.
 WEIGHT_LIMIT = 100.0
 # Up to this many vertices no step is long enough to be worth a coarser mesh.
 COARSE_ABOVE = 20_000
 # Cells of the coarse mesh per length l.
 CELLS_PER_LENGTH = 6.0
-# A coarse mesh is worth its making from this cell size on, in median edges.
+# A coarse mesh is worth its cost from this cell size on, in median edges.
 COARSE_FROM = 1.6
 # Components for which the cells would be smaller than this keep their vertices.
 LEAST_CELL = 1e-3
-# Times the median face, beyond which a face says nothing of its component's size.
+# A face counts for at most this many times the median face in its component's size.
 LARGEST_FACE = 100.0
 # Residual of the conjugate gradients, as a part of the right-hand side. Gaussian curvature spans
 # six decades on a head; at 1e-3, kappa in its flat parts was 33 % off at the worst vertex, now 0.4.
@@ -87,8 +98,11 @@ class _Level:
 
         Args:
             fields: b, (n,) each.
-            length: (n,) one length for each component.
+            length: (n,) one length for each component, in units of the median edge.
             starts: (n,) for each field, the nearer to its result the better.
+
+        Returns:
+            x, (n,) for each field.
         """
         from scipy.sparse import csr_array
 
@@ -121,7 +135,7 @@ def conjugate_gradients(
     Args:
         coupling: (n, n) sparse, symmetric, such that the whole is positive definite.
         right: (n,).
-        start: (n,) a guess at the result; unless the right-hand side itself is a better one.
+        start: (n,) a guess at the result; the right-hand side is taken where it is a better one.
 
     Returns:
         (n,), with a residual of at most RESIDUAL.
@@ -157,12 +171,27 @@ def conjugate_gradients(
 
 
 def _dot(one: Points, other: Points) -> float:
+    """Dot product of two vectors, (n,), in one thread."""
     return float(np.einsum("i,i->", one, other))
 
 
 @dataclass(frozen=True)
+class _Neighbours:
+    """Pairs of neighbouring patches, and the least squares of a gradient over them."""
+
+    here: Indices
+    """(e,) one patch of each pair; every pair stands there both ways."""
+    there: Indices
+    """(e,) the other."""
+    weight: list[Points]
+    """(3, e) offset from here to there over its squared length."""
+    moments: list[list[Points]]
+    """Lower triangle of the (3, 3, p) normal equations."""
+
+
+@dataclass(frozen=True)
 class _Coarse:
-    """A coarser mesh, and the way back from it."""
+    """A coarser mesh, and the way back to the finer one."""
 
     level: _Level
     patch: Indices
@@ -184,15 +213,17 @@ class _Coarse:
 
     def _gradients(self, values: Points) -> list[Points]:
         """Least-squares gradients over the neighbouring patches, three columns (p,)."""
-        here, there, weight, moments = self._neighbours
-        rise = values[there] - values[here]
-        slopes = [np.bincount(here, part * rise, minlength=len(values)) for part in weight]
-        gradients, _ = solve(moments, slopes)
+        near = self._neighbours
+        rise = values[near.there] - values[near.here]
+        slopes = [
+            np.bincount(near.here, part * rise, minlength=len(values)) for part in near.weight
+        ]
+        gradients, _ = solve(near.moments, slopes)
         return gradients
 
     @cached_property
-    def _neighbours(self) -> tuple[Indices, Indices, list[Points], list[list[Points]]]:
-        """Pairs of neighbouring patches, their weights, (3, e), and moments, (3, 3, p)."""
+    def _neighbours(self) -> _Neighbours:
+        """Weigh each pair of neighbouring patches for the gradients."""
         graph = self.level.weights.tocoo()
         here, there = graph.row.astype(np.int64), graph.col.astype(np.int64)
         count = len(self.level.vertices)
@@ -204,11 +235,11 @@ class _Coarse:
             [np.bincount(here, weight[i] * apart[j], minlength=count) for j in range(i + 1)]
             for i in range(3)
         ]
-        # A patch and its neighbours lie in a plane, nearly: nothing is known across it.
+        # A patch and its neighbours nearly lie in a plane: nothing is known across it.
         loose = 1e-2 * sum(moments[i][i] for i in range(3)) + np.finfo(np.float64).tiny
         for i in range(3):
             moments[i][i] += loose
-        return here, there, weight, moments
+        return _Neighbours(here, there, weight, moments)
 
 
 def _cells(places: Points) -> Indices:
@@ -220,13 +251,21 @@ def _cells(places: Points) -> Indices:
     corner = np.round(places)
     middle = np.floor(places) + 0.5
     nearer = dot(places - middle, places - middle) < dot(places - corner, places - corner)
-    # Two cells far apart may get one number: vertices are merged only where an edge joins them.
+    # Two cells far apart may share a number; vertices are merged only where an edge joins them.
     cell = (2.0 * np.where(nearer, middle, corner)).astype(np.int64)
     return (cell[0] << 42) + (cell[1] << 21) + cell[2]
 
 
 def _coarsen_steps(fine: _Level, cell: Points) -> Generator[None, None, _Coarse]:
-    """Merge the vertices that share a grid cell, of a size of its own, and are joined within it."""
+    """Merge the vertices that share a grid cell and are joined by edges within it.
+
+    Args:
+        fine: The mesh to coarsen.
+        cell: (n,) size of the cells, one number for each component, in units of the median edge.
+
+    Returns:
+        The coarse mesh and the way back.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -251,30 +290,29 @@ def _coarsen_steps(fine: _Level, cell: Points) -> Generator[None, None, _Coarse]
 
 
 def _distinct_triangles(vertices: Points, triangles: Indices) -> Indices:
-    """Drop faces that have collapsed, and doubles."""
+    """Drop faces that have collapsed, and all but one of those on the same vertices."""
     a, b, c = triangles.T
     triangles = triangles[(a != b) & (b != c) & (c != a)].astype(np.int64)
     if not len(triangles):
         return triangles
     triangles = triangles[~repeated_faces(triangles, len(vertices))]
-    _, doubled_area = face_normals(vertices, triangles)
     longest = edge_lengths(vertices, triangles).max(axis=0)
-    return triangles[doubled_area > FLATNESS_LIMIT * longest**2]
+    return triangles[face_normals(vertices, triangles).doubled_area > FLATNESS_LIMIT * longest**2]
 
 
 class Diffusion:
-    """Heat steps on a clean mesh, all lengths in its unit (the median edge)."""
+    """Take heat steps on a clean mesh; all lengths are in its unit, the median edge."""
 
     def __init__(self, mesh: CleanMesh) -> None:
-        _, self._doubled_area = mesh.face_normals
+        self._doubled_area = mesh.face_normals.doubled_area
         areas = scatter(mesh.triangles, self._doubled_area / 6.0, len(mesh.vertices))
         self._fine = _Level(mesh.vertices, mesh.triangles, areas)
         self._coarser: list[_Coarse] = []
         self._standing = np.arange(len(areas))
-        """A vertex of the fine mesh for each of the coarsest: it stands for its component."""
+        """(c,) a vertex of the fine mesh in the same component as each vertex of the coarsest."""
 
     def size(self) -> Points:
-        """Square root of the area of the component that each vertex belongs to, (n,).
+        """Return the square root of the area of the component that each vertex belongs to, (n,).
 
         A face counts for at most a hundred times its component's median face, so that a vertex that
         has flown off does not change the size of the rest.
@@ -309,7 +347,7 @@ class Diffusion:
             fields: (n,) each, at the vertices.
             length: Standard deviation of the blur, (n,), one number for each component of the
                 surface; not less than it was in the last call.
-            starts: Something like the result, (n,) each; by default the fields themselves.
+            starts: Guesses at the results, (n,) each; by default the fields themselves.
 
         Returns:
             An array (n,) for each field, within the range of its values.

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Principal curvatures at the vertices of any mesh: cleaned, estimated, filled where that fails.
+"""Principal curvatures at the vertices of any mesh: clean it, estimate, fill where the fit fails.
 
-kappa is the curvedness sqrt((k1^2 + k2^2) / 2), which is 1/r on a sphere of radius r. The work is a
-generator, so that an operator can show progress and stop between two steps.
+kappa is the curvedness sqrt((k1^2 + k2^2) / 2) of Koenderink and van Doorn (1992), which is 1/r on
+a sphere of radius r. The work is a generator, so that an operator can show its progress and stop
+between two steps.
 """
 
 from __future__ import annotations
@@ -15,14 +16,13 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..progress import counted, portion, run_steps
+from .clean import CleaningReport, CleanMesh, clean_steps
+from .creases import NO_CREASE
 from .estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
-from .mesh import NO_CREASE, CleaningReport, CleanMesh, TriMesh, clean_steps
 from .topology import adjacency, vertex_normals
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from .mesh import Points
+    from .tri_mesh import Mask, Points, TriMesh
 
 # Rounds of filling bad vertices from their neighbours: holes of up to this many rings close.
 FILL_ROUNDS = 64
@@ -32,11 +32,15 @@ CURVATURE_LIMIT = 1e3
 
 @dataclass(frozen=True)
 class Options:
-    """How curvature is measured; see `curvature_steps`."""
+    """How curvature is measured."""
 
     method: str = DEFAULT_METHOD
+    """Key of METHODS."""
     radius: int = DEFAULT_RADIUS
+    """Rings of neighbours in the fit, 2 to 10: 2 is the most accurate on clean meshes, 3 to 5 suit
+    noisy scans. Methods without rings ignore it."""
     crease_angle: float = NO_CREASE
+    """Do not fit across edges at which faces meet at a sharper angle than this, radians."""
 
 
 DEFAULT_OPTIONS = Options()
@@ -50,7 +54,7 @@ class CurvatureField:
     """The larger principal curvature; positive where the surface bulges outwards."""
     k2: Points
     """The smaller principal curvature."""
-    filled: NDArray[np.bool_]
+    filled: Mask
     """True where the fit failed and the value comes from the neighbours (or is 0: no face)."""
     report: CleaningReport = field(default_factory=CleaningReport)
 
@@ -65,13 +69,13 @@ class CurvatureField:
         return self.k1 / 2.0 + self.k2 / 2.0
 
     def sentences(self) -> list[str]:
-        """Say to an artist what was unusual, a sentence each; empty on a good mesh."""
+        """Describe for an artist what was unusual, a sentence each; empty on a good mesh."""
         lines = self.report.sentences()
         count = int(self.filled.sum())
         if count:
             lines.append(
-                f"{count:,} of {len(self.filled):,} vertices have too little around them to fit; "
-                "their curvature comes from their neighbours."
+                f"{count:,} of {len(self.filled):,} vertices have too few faces around them for a "
+                "fit; their curvature comes from their neighbours."
             )
         return lines
 
@@ -82,9 +86,11 @@ class CleanCurvature:
 
     mesh: CleanMesh
     k1: Points
+    """(n,) the larger principal curvature."""
     k2: Points
-    good: NDArray[np.bool_]
-    """False where the neighbours stood in."""
+    """(n,) the smaller principal curvature."""
+    good: Mask
+    """(n,) False where the value comes from the neighbours."""
 
     def on_source(self) -> CurvatureField:
         """Carry the curvatures back to the source's vertices and unit."""
@@ -104,7 +110,21 @@ def principal_curvatures(
     radius: int = DEFAULT_RADIUS,
     crease_angle: float = NO_CREASE,
 ) -> CurvatureField:
-    """Estimate the principal curvatures in one go; see `curvature_steps`."""
+    """Estimate the principal curvatures in one go; see `curvature_steps`.
+
+    Args:
+        mesh: Any mesh; unchanged.
+        method: Key of METHODS.
+        radius: Rings of neighbours in the fit, 2 to 10.
+        crease_angle: Do not fit across sharper edges than this, radians.
+
+    Returns:
+        The curvatures at the mesh's vertices, per unit of its positions.
+
+    Raises:
+        ParameterError: The method is unknown, or the radius outside 2 to 10.
+        MeshError: No face of the mesh can be used.
+    """
     options = Options(method, radius, crease_angle)
     return run_steps(curvature_steps(mesh, options)).on_source()
 
@@ -116,9 +136,7 @@ def curvature_steps(
 
     Args:
         mesh: Any mesh; unchanged. Positions in the unit whose inverse the result has.
-        options: method, a key of METHODS; radius, rings of neighbours in the fit, 2 to 10: 2 is the
-            most accurate on clean meshes, 3 to 5 suit noisy scans, methods without rings ignore it;
-            crease_angle: do not look across edges at which faces meet at more than this, radians.
+        options: How to measure.
 
     Yields:
         Progress from 0 to 1.
@@ -147,11 +165,11 @@ def curvature_steps(
     return CleanCurvature(cleaned, k1, k2, good)
 
 
-def _fill(cleaned: CleanMesh, k1: Points, k2: Points, good: NDArray[np.bool_]) -> None:
+def _fill(cleaned: CleanMesh, k1: Points, k2: Points, good: Mask) -> None:
     """Give vertices without a fit the mean of their neighbours, ring by ring, in place.
 
-    Pieces without a single fit (a lone tetrahedron) are too small for a quadric; there the turn of
-    the normals along the edges stands in.
+    A piece without a single fit (a lone tetrahedron) is too small for a quadric; it gets the turn
+    of the normals along its edges.
     """
     if good.all():
         return
@@ -175,13 +193,14 @@ def _turn_of_normals(cleaned: CleanMesh, near: Any) -> Points:
     """Mean of |dN| / |dP| over the edges at each vertex, signed: positive where normals diverge."""
     vertices = cleaned.vertices
     count = len(vertices)
-    unit, _, sound = vertex_normals(cleaned.face_normals, cleaned.triangles, count)
+    normals = vertex_normals(cleaned.face_normals, cleaned.triangles, count)
+    unit, sound = normals.unit, normals.sound
     start, end = near.nonzero()
     along, turned = vertices[end] - vertices[start], unit[end] - unit[start]
     distance = np.maximum(np.linalg.norm(along, axis=1), np.finfo(np.float64).tiny)
     bend = np.linalg.norm(turned, axis=1) / distance
     bend *= np.where((along * turned).sum(axis=1) < 0.0, -1.0, 1.0)
-    bend[~(sound[start] & sound[end])] = 0.0  # opposite sheets cancel: no normal, no turn
+    bend[~(sound[start] & sound[end])] = 0.0  # the normals of opposite sheets cancel: no turn
     edges = np.bincount(start, minlength=count) - 1  # the diagonal is no edge
     total = np.bincount(start, np.minimum(bend, CURVATURE_LIMIT), minlength=count)
     return np.asarray(total / np.maximum(edges, 1))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Curvature at the length over which light diffuses, for every length at once.
 
-A bump much smaller than the distance that light travels under the surface does not bend the
-surface, as far as the light can tell: the curvature that counts is the curvature diffused over that
-distance (decision 006). It differs from channel to channel and moves with the slider, so each
-vertex keeps kappa at a geometric series of lengths, and the shader interpolates between them.
+A bump much smaller than the distance that light travels under the surface hardly changes where the
+light emerges: what counts is the curvature diffused over that distance (decision 006). The distance
+differs from channel to channel and follows the slider, so each vertex keeps kappa at a geometric
+series of lengths, and the shader interpolates between them.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from .diffusion import Diffusion
 
 if TYPE_CHECKING:
     from .field import CleanCurvature
-    from .mesh import Points
+    from .tri_mesh import Points
 
-# Four fit into one colour attribute.
+# A colour attribute holds four.
 LEVELS = 4
 # From each length to the next; docs/results/kappa_choice.md has the loss by interpolation.
 LEVEL_RATIO = 4.0
@@ -35,13 +35,13 @@ class KappaLevels:
     """Curvature at several diffusion lengths, in the source's vertices and unit."""
 
     values: Points
-    """(N, LEVELS) kappa, 1/unit; column i at the length finest * LEVEL_RATIO^i."""
-    finest: Points
-    """(N,) the shortest length; one number for each component of the surface."""
+    """(N, LEVELS) kappa, 1/unit; column i at the length shortest * LEVEL_RATIO^i."""
+    shortest: Points
+    """(N,) the shortest length, unit; one number for each component of the surface."""
 
     def at(self, length: float) -> Points:
-        """Kappa at a length, (N,), linear in its logarithm between the stored ones."""
-        place = np.log(np.maximum(length / self.finest, 1.0)) / np.log(LEVEL_RATIO)
+        """Interpolate kappa at a length, (N,), linearly in the length's logarithm."""
+        place = np.log(np.maximum(length / self.shortest, 1.0)) / np.log(LEVEL_RATIO)
         place = np.minimum(place, LEVELS - 1.0)[:, None]
         weights = np.clip(1.0 - np.abs(np.arange(LEVELS) - place), 0.0, 1.0)
         return np.asarray((self.values * weights).sum(axis=1))
@@ -56,22 +56,28 @@ def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels
 
     The lengths are parts of the square root of a component's area, not of its edges: the same shape
     has the same levels however finely it is divided and whatever else the mesh holds.
+
+    Args:
+        curvature: Principal curvatures on a clean mesh.
+
+    Returns:
+        The levels in the source's vertices and unit.
     """
     mesh = curvature.mesh
     diffusion = Diffusion(mesh)
     yield 0.0
-    finest = diffusion.size() / LEVEL_RATIO**LEVELS
+    shortest = diffusion.size() / LEVEL_RATIO**LEVELS
     k1, k2 = curvature.k1, curvature.k2
     mean, gaussian = yield from portion(
-        diffusion.steps(((k1 + k2) / 2.0, k1 * k2), finest), 0.0, 0.5
+        diffusion.steps(((k1 + k2) / 2.0, k1 * k2), shortest), 0.0, 0.5
     )
-    # Averages of two numbers' sum and product need not be those of two numbers; then k1 = k2.
+    # No two curvatures may have these averages as their sum and product; then k1 = k2.
     kappa = np.sqrt(np.maximum(2.0 * mean**2 - gaussian, mean**2))
     # With obtuse triangles a step is not quite an average, and may overshoot.
     kappa = np.minimum(kappa, np.sqrt((k1**2 + k2**2).max() / 2.0))
     fields = [kappa]
     for level in range(1, LEVELS):
-        steps = diffusion.steps([kappa], finest * LEVEL_RATIO**level, fields[-1:])
+        steps = diffusion.steps([kappa], shortest * LEVEL_RATIO**level, fields[-1:])
         fields += yield from portion(steps, 0.3 + 0.2 * level, 0.5 + 0.2 * level)
     columns = [mesh.to_source(values) / mesh.edge for values in fields]
-    return KappaLevels(np.stack(columns, axis=1), mesh.to_source(finest, loose=1.0) * mesh.edge)
+    return KappaLevels(np.stack(columns, axis=1), mesh.to_source(shortest, loose=1.0) * mesh.edge)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a whole mesh's curvature amounts to: flat, constant or varying, and its usual range."""
+"""Summarise the curvature of a whole mesh: flat, constant or varying, and its usual range."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .field import CurvatureField
-from .mesh import TriMesh
+from .tri_mesh import TriMesh
 
 FLAT, CONSTANT, VARYING = "FLAT", "CONSTANT", "VARYING"
 
@@ -21,15 +21,16 @@ FLAT_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class CurvatureSummary:
-    """Curvature of a mesh in a few numbers, per unit of length."""
+    """Curvature of a mesh in a few numbers, 1/unit."""
 
     kind: str
     """FLAT, CONSTANT or VARYING."""
     low: float
     """5th percentile of kappa."""
     median: float
+    """50th percentile of kappa."""
     high: float
-    """95th percentile of kappa; the maximum of a real mesh is a crease and says little."""
+    """95th percentile of kappa; the maximum of a real mesh is at a crease, and means little."""
     mean_high: float
     """95th percentile of the absolute mean curvature."""
     mean_values: tuple[float, float, float, float]
@@ -37,7 +38,7 @@ class CurvatureSummary:
 
 
 def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
-    """Classify the curvature at the vertices that belong to a face."""
+    """Classify the curvature of a mesh by its values at the vertices that belong to a face."""
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.triangles] = True
     used &= np.isfinite(mesh.vertices).all(axis=1)
@@ -52,7 +53,7 @@ def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
     if kappa.max() == 0.0 or kappa.max() * size <= FLAT_TOLERANCE:
         kind = FLAT
     elif kappa.max() - kappa.min() <= 2.0 * CONSTANT_TOLERANCE * kappa.mean():
-        # Equal kappa is not enough: k1, k2 are kept for what a pixel may need later.
+        # Equal kappa is not enough: k1 and k2 are stored, too, and have to be constant.
         spread = max(np.ptp(field.k1[used]), np.ptp(field.k2[used]))
         if spread <= 4.0 * CONSTANT_TOLERANCE * kappa.mean():
             kind = CONSTANT
@@ -61,4 +62,4 @@ def summarise(mesh: TriMesh, field: CurvatureField) -> CurvatureSummary:
 
 
 FLAT_SUMMARY = CurvatureSummary(FLAT, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
-"""Of a mesh that bends nowhere."""
+"""Of a mesh that is flat everywhere."""

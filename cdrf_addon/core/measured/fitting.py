@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..reflectance.ring import reflectance
+from ..reflectance.ring_model import ring_reflectance
 from ..reflectance.sphere_model import sphere_reflectance
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-MODELS: dict[str, Callable[..., Array]] = {"ring": reflectance, "sphere": sphere_reflectance}
+MODELS: dict[str, Callable[..., Array]] = {"ring": ring_reflectance, "sphere": sphere_reflectance}
 # Widths tried before the best of them is refined; 0 is Lambert.
 SIGMAS = np.concatenate(([0.0], np.geomspace(1e-3, 8.0, 120)))
 SIGMA_TOLERANCE = 1e-6

@@ -146,20 +146,29 @@ def bin_pixels(cosine: Array) -> NDArray[np.int64]:
     return merged[first]
 
 
+@dataclass(frozen=True)
+class PooledPixels:
+    """Means over the pixels of each bin."""
+
+    cosine: Array
+    """(B,) mean N.L."""
+    values: Array
+    """(S, 3, B) radiance / (albedo * irradiance / pi)."""
+    errors: Array
+    """(S, 3, B) standard error of the values."""
+
+
 def pool(
     cosine: Array, total: Array, square: Array, passes: int, numbers: NDArray[np.int64]
-) -> tuple[Array, Array, Array]:
+) -> PooledPixels:
     """Average the pixels of each bin.
 
     Args:
         cosine: (P,) N.L of the pixels.
-        total: (S, P, 3) sums over the passes.
-        square: (S, P, 3) sums of squares over the passes.
-        passes: How many, at least 2.
-        numbers: (P,) from `bin_pixels`.
-
-    Returns:
-        cosine (B,), values (S, 3, B) and standard errors (S, 3, B).
+        total: (S, P, 3) sums of the values over the passes.
+        square: (S, P, 3) sums of their squares over the passes.
+        passes: Number of passes, at least 2.
+        numbers: (P,) bin of each pixel, from `bin_pixels`.
     """
     count = np.bincount(numbers).astype(np.float64)
     members = np.zeros((len(numbers), len(count)))
@@ -174,7 +183,7 @@ def pool(
     counts = np.concatenate((count[:1], count, count[-1:]))
     each = padded[..., :-2] + padded[..., 1:-1] + padded[..., 2:]
     errors = np.sqrt(each / (counts[:-2] + counts[1:-1] + counts[2:]) / count)
-    return cosine @ members / count, values, np.maximum(errors, LEAST_ERROR)
+    return PooledPixels(cosine @ members / count, values, np.maximum(errors, LEAST_ERROR))
 
 
 def save(path: Path, measurement: SphereMeasurement) -> None:

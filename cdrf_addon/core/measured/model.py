@@ -19,6 +19,8 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import MeasurementError
+from ..reflectance.energy import conserving
+from ..reflectance.model import MEASURED, Model, table_key
 from .material_fit import sigma_per_scale as fitted_sigma_per_scale
 from .measurement import SphereMeasurement, equator_weights
 from .smoothing import Curve, Smoother, smooth_rows
@@ -145,6 +147,38 @@ class MeasuredModel:
         value = at(row - 1) * (1.0 - up) + at(row) * up
         share = np.minimum(scale / (LAMBERT_BELOW * first), 1.0)
         return np.asarray(np.maximum(np.cos(theta), 0.0) * (1.0 - share) + value * share)
+
+
+def measured_model(
+    spheres: SphereMeasurement, radius: tuple[float, float, float], *, keep_energy: bool
+) -> tuple[Model, float]:
+    """Return the model of what was measured, for channels of these scatter radii.
+
+    Args:
+        spheres: The measurement.
+        radius: Scatter radii of red, green and blue, in any unit of length.
+        keep_energy: Divide by what a sphere gains over Lambert (reflectance/energy.py): closer on
+            bodies that are not spheres, and no longer exact on those that are.
+
+    Returns:
+        The model, and the sigma0 that belongs to it, in the unit of the radii.
+
+    Raises:
+        MeasurementError: The radii are not zero or positive numbers, or the measurement has too few
+            spheres that scatter little.
+    """
+    slopes = [fitted_sigma_per_scale(spheres, channel) for channel in range(3)]
+    widths = [own * slope for own, slope in zip(radius, slopes, strict=True)]
+    sigma0 = max(widths)
+    # Rows are counted by the widest blur, scales by the largest radius.
+    table = MeasuredModel(spheres, radius, sigma0 / max(radius) if sigma0 > 0.0 else None)
+    red, green, blue = (float(width / sigma0) ** 2 for width in widths)
+    facts = [spheres.blender, spheres.method, spheres.seed, spheres.samples]
+    facts += [spheres.all_views, keep_energy]
+    numbers = [float(number) for number in (*spheres.albedo, *table.ratio)]
+    key = table_key(MEASURED, str(facts), str(numbers))
+    evaluate = conserving(table.evaluate) if keep_energy else table.evaluate
+    return Model(MEASURED, key, evaluate, True, (red, green, blue)), sigma0
 
 
 def _between(place: Array, rows: Array) -> tuple[Array, Array]:

@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike, NDArray
 
-    Evaluate = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
+    from ..arguments import Evaluate
 
 # Between these widths, radians, the energy is tabulated; beyond them it is that at the ends.
 FIRST_SIGMA, LAST_SIGMA, WIDTHS = 1e-7, 10.0, 512

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from .lut import DEFAULT_LAYOUT, VARIANCE_MAX, LutLayout, cosine_axis
-from .models import SPHERE, Model
+from .model import SPHERE, Model
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

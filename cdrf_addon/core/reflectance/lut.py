@@ -22,7 +22,7 @@ from ..errors import ParameterError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .models import Model
+    from .model import Model
 
 # From here on the ring differs from its limit 1/pi by less than exp(-SIGMA_MAX^2 / 2) / 2 = 1.9e-6,
 # the sphere from 1/4 by less than exp(-SIGMA_MAX^2) / 2 = 7e-12.

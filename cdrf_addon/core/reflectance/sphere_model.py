@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reflectance of a sphere in which light diffuses as heat does: no energy won or lost.
+"""The sphere model: light diffuses over a sphere as heat does; no energy is gained or lost.
 
 f(theta, sigma) = exp(sigma^2 / 2 Laplacian) max(cos theta, 0) on the unit sphere. Where the paper's
 f is a Gaussian blur along a circle, and so exact on a cylinder lit across its axis, this is the

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..reflectance.models import PROFILE, SPHERE
+from ..reflectance.model import PROFILE, SPHERE
 from .dipole import Medium
 
 Colour = tuple[float, float, float]

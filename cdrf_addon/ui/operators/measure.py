@@ -28,9 +28,9 @@ from ...core.curvature.summary import CONSTANT
 from ...core.errors import CdrfError, ParameterError, SceneError
 from ...core.measured.material_fit import MaterialFit, fit_material, sigma0_at
 from ...core.measured.measurement import SphereMeasurement
-from ...core.measured.model import MeasuredModel
+from ...core.measured.model import MeasuredModel, measured_model
 from ...core.progress import run_steps
-from ...core.reflectance.models import RING, SPHERE, measured_model
+from ...core.reflectance.model import RING, SPHERE
 from ...core.scattering.node_radius import BURLEY, sigma0_per_radius
 from ...measuring.picture import make_picture, picture_path, show_picture
 from ...measuring.process import (

@@ -11,7 +11,7 @@ from ...blender.material import model as reflectance_models
 from ...blender.material.install import active_skin, cdrf_node
 from ...blender.material.scattering import read_scattering
 from ...core.errors import CdrfError
-from ...core.reflectance.models import DEFAULT_KIND, MODEL_ITEMS
+from ...core.reflectance.model import DEFAULT_KIND, MODEL_ITEMS
 from ...core.scattering.presets import PRESETS
 
 # Blurs of the middle of an object that look like none at all, and like wax throughout.

@@ -19,9 +19,9 @@ from ...blender.material import linking
 from ...blender.material import model as reflectance_models
 from ...blender.mesh.attributes import remove_curvature
 from ...blender.setup import Report, Setup, skins_of, skins_on, translucent_objects
+from ...core.curvature.creases import NO_CREASE
 from ...core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
 from ...core.curvature.field import Options
-from ...core.curvature.mesh import NO_CREASE
 from ...core.errors import CdrfError
 from ..modal import StepByStep
 

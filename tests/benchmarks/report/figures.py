@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from cdrf_addon.core.reflectance.models import ring, sphere
+from cdrf_addon.core.reflectance.model import ring, sphere
 
 from .contenders import (
     CONTENDERS,

@@ -19,7 +19,7 @@ from cdrf_addon.compat import ensure_node_tree
 from cdrf_addon.core.measured.material_fit import fit_material
 from cdrf_addon.core.measured.model import MeasuredModel
 from cdrf_addon.core.reflectance.lut import build_lut, sample_lut
-from cdrf_addon.core.reflectance.models import sphere
+from cdrf_addon.core.reflectance.model import sphere
 from cdrf_addon.measuring.figure import draw_fit
 from cdrf_addon.measuring.process import Request
 from cdrf_addon.measuring.process import measure as measure_spheres

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from cdrf_addon.core.reflectance.models import Profile
+from cdrf_addon.core.reflectance.profile import Profile
 from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
 from cdrf_addon.core.scattering.presets import PRESETS, Colour, Preset
 

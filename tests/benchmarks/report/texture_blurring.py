@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
-from cdrf_addon.core.reflectance.models import Profile
+from cdrf_addon.core.reflectance.profile import Profile
 
 from .scenes import Geometry
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Estimators of curvature behind one interface; results/estimators.md has errors and times."""
+"""Estimators of curvature behind one interface; docs/results/estimators.md has errors and times."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .polynomial import CUBIC, GOLDFEATHER, QUADRIC, polynomial_steps
 from .tensor import tensor_steps
 
 if TYPE_CHECKING:
-    from ..mesh import CleanMesh
+    from ..clean import CleanMesh
 
 Steps = Generator[float, None, Estimate]
 
@@ -27,10 +27,13 @@ class Method:
     """A way to estimate curvature."""
 
     label: str
+    """Name in the menu."""
     description: str
+    """Tooltip."""
     steps: Callable[[CleanMesh, int], Steps]
-    """(clean mesh, rings) -> generator of progress that returns an Estimate."""
+    """(clean mesh, rings) to a generator of progress that returns an Estimate."""
     takes_radius: bool = True
+    """Whether the number of rings changes the result."""
 
 
 def _richardson_steps(mesh: CleanMesh, radius: int) -> Steps:

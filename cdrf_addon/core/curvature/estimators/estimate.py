@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every estimator returns."""
+"""The result of an estimator, and the faces that a fit over rings can use."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from ..mesh import CleanMesh, Points
+    from ..clean import CleanMesh
+    from ..tri_mesh import Indices, Mask, Points
 
 # A neighbourhood grows with the square of the valence, and so do time and memory.
 VALENCE_LIMIT = 256
@@ -25,23 +24,24 @@ class Estimate:
     """(n,) the larger; positive where the surface bulges outwards."""
     k2: Points
     """(n,) the smaller."""
-    good: NDArray[np.bool_]
-    """(n,) False where the estimator has nothing to say; k1 and k2 are arbitrary there."""
+    good: Mask
+    """(n,) False where the estimator has no result; k1 and k2 are arbitrary there."""
 
     @classmethod
     def empty(cls, count: int) -> Estimate:
-        """Say nothing of `count` vertices yet."""
+        """Return an estimate of `count` vertices that has no result yet."""
         return cls(np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool))
 
-    def put(self, rows: slice | NDArray[np.int64], part: Estimate) -> None:
+    def put(self, rows: slice | Indices, part: Estimate) -> None:
         """Fill in some of the vertices."""
         self.k1[rows], self.k2[rows], self.good[rows] = part.k1, part.k2, part.good
 
 
-def fittable_faces(mesh: CleanMesh) -> NDArray[np.bool_]:
-    """Tell which faces a fit over rings may use, (m,), and count the hubs in the mesh's report.
+def fittable_faces(mesh: CleanMesh) -> Mask:
+    """Return which faces a fit over rings can use, (m,), and count the hubs in the mesh's report.
 
-    Left out are the faces at vertices that join too many edges, and along a seam without a side.
+    Excluded are the faces at vertices that join too many edges, and those along the seam of a
+    surface without an outside.
     """
     hub = np.bincount(mesh.triangles.ravel(), minlength=len(mesh.vertices)) > VALENCE_LIMIT
     mesh.report.hub_vertices = int(hub.sum())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many small systems of normal equations, solved at once."""
+"""Solve many small systems of normal equations at once."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from ..mesh import Points
+    from ..tri_mesh import Mask, Points
 
 # Part of a diagonal entry that elimination must leave for the points to determine the fit.
 PIVOT_LIMIT = 1e-8
@@ -18,7 +16,7 @@ PIVOT_LIMIT = 1e-8
 
 def solve(
     matrix: list[list[Points]], right: list[Points], limit: float = PIVOT_LIMIT
-) -> tuple[list[Points], NDArray[np.bool_]]:
+) -> tuple[list[Points], Mask]:
     """Solve many small symmetric systems at once by Cholesky's method, L D L^T.
 
     Args:
@@ -27,7 +25,7 @@ def solve(
         limit: See PIVOT_LIMIT.
 
     Returns:
-        k arrays (n,), and where the system determines them.
+        The solution, k arrays (n,), and where the system determines it, (n,).
     """
     size = len(right)
     lower: list[list[Points]] = [[] for _ in range(size)]

@@ -2,11 +2,11 @@
 """libigl's quadric fit (Panozzo, Puppo and Rocca 2010), guarded against what crashes it.
 
 Its mean curvature is right; k1 and k2 depend on the order of the vertices by up to some parts in a
-thousand of the largest, as it symmetrises the Weingarten map wrongly. A clean mesh has its vertices
-in an order of its own, so that the same shape always gives the same numbers.
+thousand of the largest, as it symmetrises the Weingarten map wrongly. A clean mesh sorts its
+vertices, so that the same shape always gives the same numbers.
 
-libigl holds Python's interpreter lock, so the work is cut into pieces, to show progress and to be
-stopped between them.
+libigl holds Python's interpreter lock, so the work is cut into pieces, between which progress is
+shown and the work can be stopped.
 """
 
 from __future__ import annotations
@@ -23,21 +23,20 @@ from ..topology import NORMAL_LIMIT, adjacency, face_normals, vertex_normals
 from .estimate import Estimate, fittable_faces
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from ..clean import CleanMesh
+    from ..tri_mesh import Indices, Mask, Points
 
-    from ..mesh import CleanMesh, Indices, Points
-
-# A chunk of this many vertices takes libigl about 0.15 s: short enough to feel alive.
+# libigl takes about 0.15 s for a chunk of this many vertices: Blender stays responsive.
 CHUNK_VERTICES = 16_384
 # Rounds of removing vertices without a normal; each round only removes, so it ends.
 GUARD_ROUNDS = 64
 
 
 def import_igl() -> ModuleType:
-    """Import libigl late: it loads scipy, 0.2 s.
+    """Import libigl late, as it loads scipy, 0.2 s.
 
     Raises:
-        DependencyError: It is not there; the extension's own package brings it.
+        DependencyError: It is not installed; the extension's own package brings it.
     """
     try:
         import igl
@@ -69,12 +68,16 @@ def libigl_steps(mesh: CleanMesh, radius: int) -> Generator[float, None, Estimat
 
 @dataclass(frozen=True)
 class _Part:
+    """A piece of the mesh with the rings around it."""
+
     vertices: Points
+    """(p, 3) positions."""
     triangles: Indices
+    """(q, 3) indices in this part."""
     rows: Indices
-    """Index in the whole mesh of the vertices wanted."""
+    """(b,) index in the whole mesh of the vertices wanted."""
     local: Indices
-    """The same vertices in this part."""
+    """(b,) the same vertices in this part."""
 
 
 def _guard_steps(mesh: CleanMesh, radius: int) -> Generator[float, None, Indices]:
@@ -87,13 +90,14 @@ def _guard_steps(mesh: CleanMesh, radius: int) -> Generator[float, None, Indices
     count = len(mesh.vertices)
     progress = 0.0
     for _ in range(GUARD_ROUNDS):
-        unit, used, sound = vertex_normals(face_normals(mesh.vertices, triangles), triangles, count)
-        bad = used & ~sound
+        normals = vertex_normals(face_normals(mesh.vertices, triangles), triangles, count)
+        used = normals.used
+        bad = used & ~normals.sound
         near = adjacency(triangles, count).astype(np.float64)
         progress += (0.3 - progress) / 4.0
         yield progress
-        # Not rings of each vertex once, but walks: the same for a normal that vanishes.
-        ring, weight = unit, used.astype(np.float64)
+        # Sums over walks, not over rings with each vertex once; both vanish together.
+        ring, weight = normals.unit, used.astype(np.float64)
         for _ring in range(radius):
             ring, weight = near @ ring, near @ weight
         bad |= used & (np.sqrt((ring**2).sum(axis=1)) <= NORMAL_LIMIT * weight)
@@ -110,7 +114,7 @@ def _chunks(
 ) -> Generator[tuple[_Part, float], None, None]:
     """Cut the mesh into compact pieces, each with the rings around it that its fits need.
 
-    Order within a piece is the order in the whole, so that the result does not depend on the cut;
+    The order within a piece is that of the whole, so that the result does not depend on the cut;
     consecutive vertices of a clean mesh lie together.
     """
     count = len(vertices)
@@ -133,7 +137,7 @@ def _chunks(
     for start in range(0, count, CHUNK_VERTICES):
         rows = np.arange(start, min(start + CHUNK_VERTICES, count))
         within = rows
-        # radius rings for the fit, one more because their normals look at their own faces.
+        # `radius` rings for the fit, and one more for the normals of the outermost.
         for _ring in range(radius + 1):
             faces = _distinct(incidence[within].indices, len(triangles))
             if not len(faces):
@@ -155,6 +159,7 @@ def _distinct(indices: Indices, count: int) -> Indices:
 
 
 def _fit(part: _Part, radius: int) -> Estimate:
+    """Fit one piece, a sentinel dome in front of it."""
     igl = import_igl()
     sentinel_vertices, sentinel_triangles = _sentinel()
     offset = len(sentinel_vertices)
@@ -163,7 +168,7 @@ def _fit(part: _Part, radius: int) -> Estimate:
         np.concatenate((sentinel_triangles, part.triangles + offset)),
         radius,
     )
-    good: NDArray[np.bool_] = np.zeros(len(part.vertices), dtype=bool)
+    good: Mask = np.zeros(len(part.vertices), dtype=bool)
     good[part.triangles] = True
     failed = np.asarray(bad, dtype=np.int64)
     good[failed[failed >= offset] - offset] = False

@@ -2,8 +2,8 @@
 """Discrete differential-geometry operators of Meyer et al. 2003, the paper's reference 10.
 
 Mean curvature from the cotangent Laplacian of the positions, Gaussian curvature from the angle
-defect, both over the mixed Voronoi area. Exact in the limit on regular meshes only, and nothing to
-say at a boundary.
+defect, both over the mixed Voronoi area. Exact in the limit on regular meshes only, and undefined
+at a boundary.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .estimate import Estimate
 from .libigl import import_igl
 
 if TYPE_CHECKING:
-    from ..mesh import CleanMesh
+    from ..clean import CleanMesh
 
 
 def meyer_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
@@ -40,11 +40,11 @@ def meyer_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
     curvature_normal = -(igl.cotmatrix(vertices, triangles) @ vertices) / (2.0 * area[:, None])
     yield 0.6
     gaussian = igl.gaussian_curvature(vertices, triangles) / area
-    normals, _, sound = vertex_normals(mesh.face_normals, triangles, count)
+    normals = vertex_normals(mesh.face_normals, triangles, count)
     mean = np.sqrt((curvature_normal**2).sum(axis=1))
-    mean = np.where((curvature_normal * normals).sum(axis=1) < 0.0, -mean, mean)
+    mean = np.where((curvature_normal * normals.unit).sum(axis=1) < 0.0, -mean, mean)
     split = np.sqrt(np.maximum(mean**2 - gaussian, 0.0))
     inner = np.ones(count, dtype=bool)
     inner[igl.boundary_facets(triangles)[0].ravel()] = False
     yield 1.0
-    return Estimate(mean + split, mean - split, inner & sound & ~mesh.seam)
+    return Estimate(mean + split, mean - split, inner & normals.sound & ~mesh.seam)

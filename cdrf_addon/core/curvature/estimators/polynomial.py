@@ -12,7 +12,7 @@ it is taken from both fundamental forms, so that the frame, and with it the orde
 
 All vertices of a block are fitted at once: every entry of their normal equations is a sum over the
 rings of x^p y^q, possibly times z. Arrays of pairs are (r, b): a column for each of b vertices, a
-row for each of its r neighbours, so that a sum adds up whole rows. numpy lets go of the interpreter
+row for each of its r neighbours, so that a sum adds up whole rows. numpy releases the interpreter
 lock in these sums, so blocks run on as many threads as there are cores.
 """
 
@@ -22,24 +22,22 @@ import os
 from collections import deque
 from collections.abc import Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...progress import portion
-from ..topology import NORMAL_LIMIT, adjacency, columns, dot, vertex_normals
+from ..topology import NORMAL_LIMIT, VertexNormals, adjacency, columns, dot, vertex_normals
 from .estimate import Estimate, fittable_faces
 from .least_squares import PIVOT_LIMIT, solve
 from .tensor import tensor_steps
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from ..mesh import CleanMesh, Indices, Points
+    from ..clean import CleanMesh
+    from ..tri_mesh import Indices, Mask, Points
 
 Exponents = tuple[int, int]
-_Block = tuple["Indices", Estimate, "NDArray[np.bool_]"]
-"""Vertices, result, and which vertices' rings are much longer than wide."""
 
 QUADRIC: tuple[Exponents, ...] = ((2, 0), (1, 1), (0, 2), (1, 0), (0, 1))
 CUBIC: tuple[Exponents, ...] = (*QUADRIC, (3, 0), (2, 1), (1, 2), (0, 3))
@@ -47,13 +45,13 @@ GOLDFEATHER: tuple[Exponents, ...] = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1
 
 # Pairs of a vertex and a neighbour in a block: their arrays just fit into a core's cache.
 BLOCK_PAIRS = 60_000
-# Rings are made for so many blocks at once, as every product of sparse matrices costs a pass over
+# Rings are made for so many blocks at once, as every product of sparse matrices takes a pass over
 # all columns.
 BLOCKS_AT_ONCE = 16
-# A cubic that is hardly determined swings wildly; there the quadric takes over.
+# A cubic that is hardly determined oscillates; the quadric replaces it there.
 CUBIC_PIVOT_LIMIT = 1e-3
 # Squared distance of the rings' centre from the vertex, in units of their squared extent, above
-# which they are one-sided, as at a border (0.6 there, 0.17 a row further in), and take the quadric.
+# which they are one-sided, as at a border (0.6 there, 0.17 a row further in): a quadric is fitted.
 ONE_SIDED = 0.1
 # Variance across over variance along, below which rings count as long: 4.5 times as long as wide.
 ELONGATED = 0.05
@@ -74,27 +72,27 @@ def polynomial_steps(
         Principal curvatures per unit of the clean mesh.
     """
     count = len(mesh.vertices)
-    triangles, (normal, area) = mesh.triangles, mesh.face_normals
+    triangles, faces = mesh.triangles, mesh.face_normals
     kept = fittable_faces(mesh)
     if not kept.all():
-        triangles, normal, area = triangles[kept], normal[:, kept], area[kept]
-    normals, used, sound = vertex_normals((normal, area), triangles, count)
+        triangles, faces = triangles[kept], faces[kept]
+    normals = vertex_normals(faces, triangles, count)
     yield 0.03
     near = adjacency(triangles, count)
     yield 0.06
-    fit = _Fit(mesh.vertices, normals, used & sound, tuple(terms), use_normals)
+    fit = _Fit(mesh.vertices, normals, tuple(terms), use_normals)
     result = Estimate.empty(count)
     workers = max(1, os.cpu_count() or 1)
     long = np.zeros(count, dtype=bool)
     running: deque[Future[_Block]] = deque()
-
     fitted = 0
 
     def store(done: Future[_Block]) -> float:
         nonlocal fitted
-        rows, part, long[rows] = done.result()
-        result.put(rows, part)
-        fitted += len(rows)
+        block = done.result()
+        long[block.rows] = block.long
+        result.put(block.rows, block.estimate)
+        fitted += len(block.rows)
         return 0.06 + 0.84 * min(fitted / count, 1.0)
 
     with ThreadPoolExecutor(workers) as pool:
@@ -105,7 +103,7 @@ def polynomial_steps(
         while running:
             yield store(running.popleft())
     if long.any():
-        # Over rings much longer than wide, a bend along them passes for one across.
+        # In rings much longer than wide, the fit takes a bend along them for one across.
         turned = yield from portion(tensor_steps(mesh), 0.9, 1.0)
         rows = np.flatnonzero(long & turned.good)
         result.put(rows, Estimate(turned.k1[rows], turned.k2[rows], turned.good[rows]))
@@ -115,7 +113,7 @@ def polynomial_steps(
 def _ring_blocks(near: Any, radius: int) -> Generator[tuple[Indices, Indices], None, None]:
     """Cut the mesh into blocks: some vertices, (b,), and the neighbours of each, (r, b).
 
-    Those with the most neighbours come first; where others in the block have fewer, -1 follows.
+    Vertices with the most neighbours come first; the columns of the others end in -1.
     """
     count = near.shape[0]
     # Rings grow with the square of the radius: 7, 19, 37, 61 points on a regular mesh.
@@ -143,35 +141,46 @@ def _ring_blocks(near: Any, radius: int) -> Generator[tuple[Indices, Indices], N
             yield first + chosen, neighbours
 
 
+@dataclass(frozen=True)
+class _Block:
+    """The fit around some vertices."""
+
+    rows: Indices
+    """(b,) the vertices."""
+    estimate: Estimate
+    long: Mask
+    """(b,) True where the rings are much longer than wide."""
+
+
 class _Fit:
+    """Fits one polynomial, block by block."""
+
     def __init__(
         self,
         vertices: Points,
-        normals: Points,
-        sound: NDArray[np.bool_],
+        normals: VertexNormals,
         terms: tuple[Exponents, ...],
         use_normals: bool,
     ) -> None:
-        self.sound, self.terms, self.use_normals = sound, terms, use_normals
-        self.places, self.normals = columns(vertices), columns(normals)
+        self.sound, self.terms, self.use_normals = normals.used & normals.sound, terms, use_normals
+        self.places, self.normals = columns(vertices), columns(normals.unit)
 
-    # Rings too small for their powers to be held come out as NaN, which `solve` takes for unsolved.
+    # Powers of very small rings underflow to NaN, which `solve` reports as unsolved.
     @np.errstate(divide="ignore", invalid="ignore", over="ignore", under="ignore")
     def block(self, rows: Indices, rings: Indices) -> _Block:
         """Fit around some vertices, (b,), with the neighbours of each, (r, b)."""
         pairs = _Pairs(rows, rings, self.places, self.normals)
         k1, k2, solved = self._curvatures(pairs, self.terms)
         if len(self.terms) > len(QUADRIC) and not solved.all():
-            # Too few neighbours for a cubic, or on one side only, may be enough for a quadric.
+            # Neighbours too few for a cubic, or on one side only, may determine a quadric.
             other1, other2, other = self._curvatures(pairs, QUADRIC)
             k1, k2 = np.where(solved, k1, other1), np.where(solved, k2, other2)
             solved |= other
         good = self.sound[rows] & pairs.has_normal & solved & (pairs.count >= 5.0)
-        return rows, Estimate(k1, k2, good), pairs.long
+        return _Block(rows, Estimate(k1, k2, good), pairs.long)
 
-    def _curvatures(
-        self, pairs: _Pairs, terms: Sequence[Exponents]
-    ) -> tuple[Points, Points, NDArray[np.bool_]]:
+    def _curvatures(self, pairs: _Pairs, terms: Sequence[Exponents]) -> tuple[Points, Points, Mask]:
+        """Return k1, k2 and where the fit of these terms is determined, (b,) each."""
         limit = CUBIC_PIVOT_LIMIT if len(terms) > len(QUADRIC) else PIVOT_LIMIT
         solution, solved = solve(*self._equations(pairs, terms), limit)
         of = dict(zip(terms, solution, strict=True))
@@ -220,7 +229,7 @@ class _Pairs:
         self.has_normal = length > NORMAL_LIMIT * size
         mean /= np.where(self.has_normal, length, 1.0)
         self._frame = [*_tangents(mean), mean]
-        # A neighbour that looks the other way lies on another sheet; padding looks nowhere.
+        # A neighbour whose normal points away lies on another sheet; that of padding is 0.
         self._up = dot(mean, self._turned)
         self._same = same = (self._up > 0.0).astype(np.float64)
         away = [np.take(axis, rings, mode="clip") - axis[rows] for axis in places]
@@ -292,7 +301,7 @@ def _sum(values: Points, times: Points | None = None) -> Points:
 
 
 def _tangents(normal: Points) -> tuple[Points, Points]:
-    """Two unit vectors that make a frame with each unit normal, (3, n) (Duff et al. 2017)."""
+    """Return two unit tangents to each unit normal, (3, n), a frame with it (Duff et al. 2017)."""
     x, y, z = normal
     sign = np.where(z < 0.0, -1.0, 1.0)
     a = -1.0 / (sign + z)

@@ -18,7 +18,8 @@ from .estimate import Estimate
 from .least_squares import solve
 
 if TYPE_CHECKING:
-    from ..mesh import CleanMesh, Points
+    from ..clean import CleanMesh
+    from ..tri_mesh import Mask, Points
 
 
 def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
@@ -34,7 +35,7 @@ def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
     count = len(vertices)
     corners = [vertices.T[:, triangles[:, corner]] for corner in range(3)]
     edges = [corners[(i + 2) % 3] - corners[(i + 1) % 3] for i in range(3)]
-    normal, doubled_area = mesh.face_normals
+    normal, doubled_area = mesh.face_normals.scaled, mesh.face_normals.doubled_area
     normals, sound = _max_normals(mesh, normal, edges)
     yield 0.3
     at_corner = [normals.T[:, triangles[:, corner]] for corner in range(3)]
@@ -57,13 +58,13 @@ def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
     return Estimate(k1, k2, sound & ~mesh.seam)
 
 
-# What overflows on needles is infinite or NaN, and as useless as anything above the limit.
-_unheld = np.errstate(over="ignore", invalid="ignore", divide="ignore")
+# What overflows on needles becomes infinite or NaN, and is replaced like any value above the limit.
+_allow_overflow = np.errstate(over="ignore", invalid="ignore", divide="ignore")
 
 
-@_unheld
+@_allow_overflow
 def _tensor(form: tuple[Points, Points, Points], u: Points, v: Points) -> list[Points]:
-    """The six entries of a face's second form in space, its axes turned into u and v."""
+    """Return the six entries of a face's second form in space, its axes turned into u and v."""
     e, f, g = form
     return [
         e * u[i] * u[j] + f * (u[i] * v[j] + v[i] * u[j]) + g * v[i] * v[j]
@@ -71,9 +72,9 @@ def _tensor(form: tuple[Points, Points, Points], u: Points, v: Points) -> list[P
     ]
 
 
-@_unheld
+@_allow_overflow
 def _principal(total: Points, normals: Points) -> tuple[Points, Points]:
-    """Principal curvatures of the mean tensor at each vertex."""
+    """Return the principal curvatures of the mean tensor at each vertex, (n,) each."""
     xx, xy, xz, yy, yz, zz = total[:6] / np.maximum(total[6], np.finfo(np.float64).tiny)
     # The tensor has no part along the normal: k1 and k2 are half its trace, more or less the size
     # of what is left in the tangent plane without that half.
@@ -89,9 +90,9 @@ def _principal(total: Points, normals: Points) -> tuple[Points, Points]:
     return half + split, half - split
 
 
-@_unheld
-def _max_normals(mesh: CleanMesh, normal: Points, edges: list[Points]) -> tuple[Points, np.ndarray]:
-    """Vertex normals weighted as by Max 1999, exact where the vertices lie on a sphere."""
+@_allow_overflow
+def _max_normals(mesh: CleanMesh, normal: Points, edges: list[Points]) -> tuple[Points, Mask]:
+    """Weigh vertex normals as Max (1999) does: exact where the vertices lie on a sphere."""
     square = [(edge**2).sum(axis=0) for edge in edges]
     count = len(mesh.vertices)
     total = np.zeros((3, count))
@@ -109,11 +110,11 @@ def _max_normals(mesh: CleanMesh, normal: Points, edges: list[Points]) -> tuple[
     return (total / np.where(sound, length, 1.0)).T, sound
 
 
-@_unheld
+@_allow_overflow
 def _second_form(
     edges: list[Points], normals: list[Points], along: Points, across: Points
 ) -> tuple[Points, Points, Points]:
-    """Least-squares second fundamental form (e, f; f, g) of each face in its own axes."""
+    """Fit the second fundamental form (e, f; f, g) of each face in its own axes, (m,) each."""
     zero = np.zeros(edges[0].shape[1])
     matrix = [[zero, zero, zero] for _ in range(3)]
     right = [zero, zero, zero]
@@ -132,7 +133,7 @@ def _second_form(
     return e, f, g
 
 
-@_unheld
+@_allow_overflow
 def _turned(axis: Points, from_normal: Points, to_normal: Points) -> Points:
     """Turn a vector in the plane of one normal into that of another, by the shortest way."""
     lean = (axis * to_normal).sum(axis=0)
@@ -142,7 +143,7 @@ def _turned(axis: Points, from_normal: Points, to_normal: Points) -> Points:
 
 
 def _voronoi_corners(edges: list[Points], doubled_area: Points) -> list[Points]:
-    """Voronoi area of each corner, or its share of an obtuse face (Meyer et al. 2003)."""
+    """Return each corner's Voronoi area, or its share of an obtuse face (Meyer et al. 2003)."""
     square = [(edge**2).sum(axis=0) for edge in edges]
     cotangent = [
         (square[(i + 1) % 3] + square[(i + 2) % 3] - square[i]) / (2.0 * doubled_area)

@@ -10,21 +10,21 @@ import pytest
 from references import ANGLES, SIGMAS, Values, reference_error, ring_reference, sphere_reference
 
 from cdrf_addon.core.errors import CdrfError, ParameterError
-from cdrf_addon.core.reflectance.models import (
-    DEFAULT_KIND,
-    MOST_GAUSSIANS,
+from cdrf_addon.core.reflectance.model import (
     PROFILE,
     RING,
-    SKIN_PROFILE,
     SPHERE,
-    Profile,
-    name_of,
-    parse_profile,
-    profile,
     ring,
     sphere,
 )
-from cdrf_addon.core.reflectance.ring import reflectance
+from cdrf_addon.core.reflectance.profile import (
+    MOST_GAUSSIANS,
+    SKIN_PROFILE,
+    Profile,
+    parse_profile,
+    profile,
+)
+from cdrf_addon.core.reflectance.ring_model import ring_reflectance
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
 
 pytestmark = pytest.mark.smoke
@@ -57,25 +57,13 @@ REFERENCES: dict[str, Callable[[Values, float], Values]] = {
     RING: ring_reference,
     SPHERE: sphere_reference,
 }
-ONE = {RING: reflectance, SPHERE: sphere_reflectance}
+ONE = {RING: ring_reflectance, SPHERE: sphere_reflectance}
 BASES = [RING, SPHERE]
 COLUMN = np.array(SIGMAS)[:, None]
 
 
 def on(base: str, shape: Profile = MIXED) -> Profile:
     return dataclasses.replace(shape, base=base)
-
-
-def test_the_kinds() -> None:
-    assert DEFAULT_KIND == SPHERE
-    for model, kind in ((ring(), RING), (sphere(), SPHERE)):
-        assert (model.kind, model.key, model.colour) == (kind, kind, False)
-        assert model.moments == WHITE
-        assert np.array_equal(model.evaluate(ANGLES, 0.3), ONE[kind](ANGLES, 0.3))
-    assert profile().kind == PROFILE
-    assert profile().colour
-    assert name_of(RING) == "Ring"
-    assert name_of(f"{PROFILE} 0123abcd") == "Profile 0123abcd"
 
 
 @pytest.mark.parametrize("base", BASES)

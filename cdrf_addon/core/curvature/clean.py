@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Triangle meshes made fit for libigl: welded, finite, non-degenerate, consistently wound.
+"""Clean a triangle mesh for the estimators: weld, filter, orient, normalise and sort it.
 
 libigl crashes, hangs or returns silent zeros on what artists call a normal mesh (loose vertices,
 doubled faces, seams, one vertex at infinity). `clean` returns a copy on which none of that can
-happen, says what it left out, and keeps the way back to the artist's vertices.
+happen, reports what it left out, and keeps the way back to the artist's vertices.
 """
 
 from __future__ import annotations
@@ -17,69 +17,30 @@ import numpy as np
 
 from ..errors import MeshError
 from ..progress import run_steps
+from .creases import NO_CREASE, split_creases
 from .topology import (
+    FLATNESS_LIMIT,
+    KEY_BITS,
+    FaceNormals,
     columns,
     edge_lengths,
-    edge_pairs,
+    face_key,
     face_normals,
-    half_edges,
     has_repeats,
-    runs_twice,
+    repeated_faces,
 )
+from .winding import orient
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from .tri_mesh import Indices, Mask, Points, TriMesh
 
-    Points = NDArray[np.float64]
-    Indices = NDArray[np.int64]
-
-# A triangle flatter than this (height / longest edge) has no usable normal in float32 coordinates.
-FLATNESS_LIMIT = 1e-6
 # A face this many times the median edge belongs to a vertex that has flown off.
 EDGE_LIMIT = 1e6
-# Three vertices of up to so many bits fit into one number.
-KEY_BITS = 21
-# Faces never meet at this angle: nothing is split.
-NO_CREASE = np.pi
-
-
-@dataclass(frozen=True)
-class TriMesh:
-    """A triangle mesh as plain arrays: what Blender hands over, nothing assumed of it.
-
-    Raises:
-        MeshError: The arrays do not have the shape of a mesh.
-    """
-
-    vertices: Points
-    """(n, 3) positions, float64, any unit."""
-    triangles: Indices
-    """(m, 3) vertex indices, int64."""
-
-    def __post_init__(self) -> None:
-        if self.vertices.ndim != 2 or self.vertices.shape[1] != 3:
-            raise MeshError(f"Vertices must have the shape (n, 3), not {self.vertices.shape}.")
-        if self.triangles.ndim != 2 or self.triangles.shape[1] != 3:
-            raise MeshError(f"Triangles must have the shape (m, 3), not {self.triangles.shape}.")
-        if self.triangles.size and not (
-            self.triangles.min() >= 0 and self.triangles.max() < len(self.vertices)
-        ):
-            raise MeshError(
-                f"A triangle names a vertex that does not exist (there are {len(self.vertices)})."
-            )
-
-    @classmethod
-    def from_arrays(cls, vertices: ArrayLike, triangles: ArrayLike) -> TriMesh:
-        """Convert anything array-like to float64 vertices and int64 triangles."""
-        return cls(
-            np.ascontiguousarray(vertices, dtype=np.float64),
-            np.ascontiguousarray(triangles, dtype=np.int64),
-        )
 
 
 @dataclass
 class CleaningReport:
-    """What `clean` left out or changed, as counts; all zero on a good mesh."""
+    """Counts of what `clean` left out or changed; all zero on a good mesh."""
 
     non_finite_vertices: int = 0
     stray_faces: int = 0
@@ -93,7 +54,7 @@ class CleaningReport:
 
     def sentences(self) -> list[str]:
         """Describe for an artist what is worth knowing, a sentence each; empty on a good mesh."""
-        told = [
+        counts = [
             (self.non_finite_vertices, "{} vertices lie at infinity or nowhere (NaN); ignored."),
             (self.stray_faces, "{} faces reach a vertex that has flown far off; ignored."),
             (self.degenerate_faces, "{} faces have no area; ignored."),
@@ -104,9 +65,12 @@ class CleaningReport:
                 "{} vertices were added where creases are split; raise the angle "
                 "if round parts are split too.",
             ),
-            (self.flipped_faces, "{} faces point the other way (Recalculate Normals mends it)."),
+            (
+                self.flipped_faces,
+                "{} faces point the other way (Mesh > Normals > Recalculate Outside mends it).",
+            ),
         ]
-        lines = [text.format(f"{count:,}") for count, text in told if count]
+        lines = [text.format(f"{count:,}") for count, text in counts if count]
         if self.non_orientable:
             lines.append("The surface has no outside (a Möbius strip); its seam is filled in.")
         return lines
@@ -114,7 +78,7 @@ class CleaningReport:
 
 @dataclass(frozen=True)
 class CleanMesh:
-    """A mesh libigl can be trusted with, centred, in units of its median edge."""
+    """A mesh that every estimator can work on, centred, in units of its median edge."""
 
     vertices: Points
     """(n, 3) welded positions, centred, divided by `edge`."""
@@ -126,17 +90,25 @@ class CleanMesh:
     """(N,) welded vertex of each source vertex; -1 where it belongs to no usable face."""
     part_of: Indices
     """(n,) welded vertex of each vertex; some have several parts where creases split the mesh."""
-    seam: NDArray[np.bool_]
+    seam: Mask
     """(n,) True where neighbouring faces cannot be wound alike (the seam of a Möbius strip)."""
     report: CleaningReport = field(default_factory=CleaningReport)
 
     @cached_property
-    def face_normals(self) -> tuple[Points, Points]:
-        """Normals scaled by twice the faces' areas, (3, m), and those doubled areas, (m,)."""
+    def face_normals(self) -> FaceNormals:
+        """Normals of the faces and their areas, in units of `edge`."""
         return face_normals(self.vertices, self.triangles)
 
     def to_source(self, values: Points, loose: float = 0.0) -> Points:
-        """Carry values of the vertices, (n,), back to the source's, (N,); the mean of its parts."""
+        """Carry values of the vertices back to the source's; a vertex gets its parts' mean.
+
+        Args:
+            values: (n,) values of the clean mesh.
+            loose: Value of source vertices that belong to no usable face.
+
+        Returns:
+            (N,) values.
+        """
         if len(self.part_of) and self.part_of[-1] + 1 < len(self.part_of):
             parts = np.bincount(self.part_of)
             values = np.bincount(self.part_of, values) / parts
@@ -144,12 +116,12 @@ class CleanMesh:
 
 
 def clean(mesh: TriMesh, crease_angle: float = NO_CREASE) -> CleanMesh:
-    """Weld, filter, orient and normalise a mesh in one go; see `clean_steps`."""
+    """Clean a mesh in one go; see `clean_steps`."""
     return run_steps(clean_steps(mesh, crease_angle))
 
 
 def clean_steps(mesh: TriMesh, crease_angle: float = NO_CREASE) -> Generator[None, None, CleanMesh]:
-    """Weld, filter, orient and normalise a mesh, pausing between the parts of the work.
+    """Weld, filter, orient, normalise and sort a mesh, pausing between the parts of the work.
 
     The result does not depend on the order of the source's vertices: they are sorted along a
     space-filling curve, which also keeps neighbours together in memory.
@@ -159,10 +131,10 @@ def clean_steps(mesh: TriMesh, crease_angle: float = NO_CREASE) -> Generator[Non
         crease_angle: Split the surface where faces meet at a sharper angle than this, in radians.
 
     Returns:
-        The mesh for the estimator and the way back.
+        The mesh for the estimators and the way back.
 
     Raises:
-        MeshError: No face is left; the text says why.
+        MeshError: No face is left; the text gives the reason.
     """
     report = CleaningReport()
     if not len(mesh.vertices):
@@ -176,11 +148,11 @@ def clean_steps(mesh: TriMesh, crease_angle: float = NO_CREASE) -> Generator[Non
     yield
     triangles = _drop_unusable(vertices, triangles, longest, report)
     yield
-    welded, first = weld(vertices)
-    report.welded_vertices = int(len(vertices) - len(first))
+    welding = weld(vertices)
+    report.welded_vertices = int(len(vertices) - len(welding.first))
     yield
     if report.welded_vertices:
-        vertices, triangles = vertices[first], welded[triangles]
+        vertices, triangles = vertices[welding.first], welding.group[triangles]
     triangles = _drop_duplicates(triangles, len(vertices), report)
     yield
     if not len(triangles):
@@ -197,15 +169,18 @@ def clean_steps(mesh: TriMesh, crease_angle: float = NO_CREASE) -> Generator[Non
     place[order] = np.arange(len(order))
     yield
     source = np.full(len(mesh.vertices), -1, dtype=np.int64)
-    source[finite] = place[welded]
+    source[finite] = place[welding.group]
     vertices = vertices[order]
     triangles = _canonical_faces(place[triangles], len(vertices))
     yield
-    triangles, seam = _orient(triangles, len(vertices), report)
+    oriented = orient(triangles, len(vertices))
+    triangles, seam = oriented.triangles, oriented.seam
+    report.flipped_faces, report.non_orientable = oriented.flipped_faces, oriented.non_orientable
     yield
     part_of = np.arange(len(vertices))
     if crease_angle < NO_CREASE:
-        triangles, part_of = split_creases(vertices, triangles, crease_angle)
+        split = split_creases(vertices, triangles, crease_angle)
+        triangles, part_of = split.triangles, split.part_of
         report.crease_vertices = len(part_of) - len(vertices)
         vertices, seam = vertices[part_of], seam[part_of]
     return CleanMesh(
@@ -219,15 +194,21 @@ def clean_steps(mesh: TriMesh, crease_angle: float = NO_CREASE) -> Generator[Non
     )
 
 
-def weld(vertices: Points) -> tuple[Indices, Indices]:
+@dataclass(frozen=True)
+class Welding:
+    """Vertices at equal positions, put together in groups."""
+
+    group: Indices
+    """(n,) group of each vertex, numbered by first appearance."""
+    first: Indices
+    """(g,) first vertex of each group."""
+
+
+def weld(vertices: Points) -> Welding:
     """Merge vertices at exactly equal positions (seams of imported files are exact copies).
 
     Args:
-        vertices: (n, 3) finite or not; NaNs are never merged wrongly, only with the same bits.
-
-    Returns:
-        (n,) new index of each vertex, numbered by first appearance, and the index of the first
-        vertex of each group.
+        vertices: (n, 3) finite or not; a NaN is merged only with one of the same bits.
     """
     bits = columns(vertices + 0.0).view(np.uint64)  # + 0.0 turns -0.0 into 0.0
     # An odd multiplier per axis mixes 192 bits into 64; the comparison below catches a collision.
@@ -237,7 +218,7 @@ def weld(vertices: Points) -> tuple[Indices, Indices]:
         key ^= (key >> np.uint64(31)) + bits[2] * np.uint64(0x94D049BB133111EB)
     if not has_repeats(key):
         each = np.arange(len(key))
-        return each, each
+        return Welding(each, each)
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
     if not np.array_equal(bits[:, first[group]], bits):
         _, first, group = np.unique(bits, axis=1, return_index=True, return_inverse=True)
@@ -245,11 +226,11 @@ def weld(vertices: Points) -> tuple[Indices, Indices]:
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    return rank[group].astype(np.int64), first[order].astype(np.int64)
+    return Welding(rank[group].astype(np.int64), first[order].astype(np.int64))
 
 
 def morton_order(vertices: Points) -> Indices:
-    """Order of the vertices along a space-filling curve (Morton 1966), (n,).
+    """Sort the vertices along a space-filling curve (Morton 1966), (n,).
 
     Equal cells are ordered by position, so that the order depends on nothing else.
     """
@@ -258,7 +239,7 @@ def morton_order(vertices: Points) -> Indices:
     code = np.zeros(len(vertices), dtype=np.uint64)
     for axis, values in enumerate(axes):
         cell = ((values - values.min()) * ((2**21 - 1) / span)).astype(np.uint64)
-        # Two zero bits between every two of the 21 bits.
+        # Insert two zero bits between every two of the 21 bits.
         for shift, mask in (
             (32, 0x1F00000000FFFF),
             (16, 0x1F0000FF0000FF),
@@ -275,9 +256,8 @@ def morton_order(vertices: Points) -> Indices:
     return order
 
 
-def _drop_non_finite(
-    mesh: TriMesh, finite: NDArray[np.bool_], report: CleaningReport
-) -> tuple[Points, Indices]:
+def _drop_non_finite(mesh: TriMesh, finite: Mask, report: CleaningReport) -> tuple[Points, Indices]:
+    """Drop the vertices that are not finite, and the faces that use them."""
     if finite.all():
         return mesh.vertices, mesh.triangles
     report.non_finite_vertices = int((~finite).sum())
@@ -324,8 +304,8 @@ def _normalise(vertices: Points, triangles: Indices) -> tuple[Points, float, Poi
     return scaled / median, edge, lengths.max(axis=0) / median
 
 
-def _used(vertices: Points, triangles: Indices) -> NDArray[np.bool_]:
-    """Tell which vertices belong to a face, (n,)."""
+def _used(vertices: Points, triangles: Indices) -> Mask:
+    """Return which vertices belong to a face, (n,)."""
     used = np.zeros(len(vertices), dtype=bool)
     used[triangles.ravel()] = True
     return used
@@ -339,132 +319,22 @@ def _drop_unusable(
     report.stray_faces = int(stray.sum())
     if stray.any():  # first, as their areas may be more than numbers can hold
         triangles, longest = triangles[~stray], longest[~stray]
-    _, doubled_area = face_normals(vertices, triangles)
-    good = doubled_area > FLATNESS_LIMIT * longest**2
+    good = face_normals(vertices, triangles).doubled_area > FLATNESS_LIMIT * longest**2
     report.degenerate_faces = int((~good).sum())
     return triangles if good.all() else triangles[good]
 
 
 def _drop_duplicates(triangles: Indices, count: int, report: CleaningReport) -> Indices:
+    """Keep one of the faces on the same three of `count` vertices."""
     repeated = repeated_faces(triangles, count)
     report.duplicate_faces = int(repeated.sum())
     return triangles[~repeated] if report.duplicate_faces else triangles
 
 
-def repeated_faces(triangles: Indices, count: int) -> NDArray[np.bool_]:
-    """Tell which faces lie on the same three of `count` vertices as an earlier one, (m,)."""
-    repeated = np.zeros(len(triangles), dtype=bool)
-    a, b, c = columns(triangles)
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    middle = a + b + c - low - high
-    # One number a face tells at once that all are different, as they mostly are.
-    if count < 2**KEY_BITS and not has_repeats(_face_key(low, middle, high)):
-        return repeated
-    order = np.lexsort((high, middle, low))
-    ordered = np.stack((low, middle, high), axis=1)[order]
-    # lexsort is stable, so the first of each run is the first in the mesh: it stays.
-    repeated[order[1:]] = (ordered[1:] == ordered[:-1]).all(axis=1)
-    return repeated
-
-
-def split_creases(vertices: Points, triangles: Indices, angle: float) -> tuple[Indices, Indices]:
-    """Cut the surface open along its sharp edges.
-
-    Args:
-        vertices: (n, 3) positions.
-        triangles: (m, 3) consistently wound faces.
-        angle: Faces that meet at a sharper angle than this, in radians, are parted.
-
-    Returns:
-        Triangles in terms of the parts, (m, 3), and the vertex each part belongs to, (p,); the
-        first n parts are the vertices themselves.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    normal, area = face_normals(vertices, triangles)
-    normal = normal / area
-    face, other, corner, opposite = shared_edges(triangles, len(vertices))
-    smooth = (normal[:, face] * normal[:, other]).sum(axis=0) >= np.cos(angle)
-    face, other, corner, opposite = (array[smooth] for array in (face, other, corner, opposite))
-    # A corner of a face goes on over a smooth edge to the corner of the next at the same vertex.
-    following, preceding = (corner + 1) % 3, (opposite + 1) % 3
-    one = np.concatenate((3 * face + corner, 3 * face + following))
-    two = np.concatenate((3 * other + preceding, 3 * other + opposite))
-    size = 3 * len(triangles)
-    graph = coo_array((np.ones(len(one), dtype=np.int8), (one, two)), (size, size))
-    _, fan = connected_components(graph, directed=False)
-    # Fans are numbered by first corner; the first fan of a vertex keeps the vertex's number.
-    owner = np.zeros(fan.max() + 1, dtype=np.int64)
-    owner[fan] = triangles.ravel()
-    order = np.argsort(owner, kind="stable")
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = owner[order][1:] != owner[order][:-1]
-    number = np.empty(len(order), dtype=np.int64)
-    number[order[first]] = owner[order[first]]
-    number[order[~first]] = len(vertices) + np.arange(int((~first).sum()))
-    part_of = np.concatenate((np.arange(len(vertices)), owner[order[~first]]))
-    return number[fan].reshape(-1, 3), part_of
-
-
-def shared_edges(triangles: Indices, count: int) -> tuple[Indices, Indices, Indices, Indices]:
-    """List the edges of exactly two faces that are wound alike.
-
-    Returns:
-        The two faces of each, and the corner of each at which the edge starts.
-    """
-    tail, head = half_edges(triangles)
-    one, other = edge_pairs(triangles, count)
-    wound = tail[one] == head[other]
-    one, other = one[wound], other[wound]
-    return one // 3, other // 3, one % 3, other % 3
-
-
-def _orient(
-    triangles: Indices, vertex_count: int, report: CleaningReport
-) -> tuple[Indices, NDArray[np.bool_]]:
-    """Wind neighbouring faces alike; the larger part of each component keeps its side.
-
-    Consistency is two-colouring the graph of faces: each face stands twice in it, as it is and
-    flipped, joined to its neighbours so that only consistent windings meet. A face that meets its
-    own mirror image lies on a surface without an outside.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    seam = np.zeros(vertex_count, dtype=bool)
-    if not runs_twice(triangles, vertex_count):
-        return triangles, seam
-    count = len(triangles)
-    tail, head = half_edges(triangles)
-    # Only edges of exactly two faces say anything about winding.
-    edge, twin = edge_pairs(triangles, vertex_count)
-    one, other, alike = edge // 3, twin // 3, tail[edge] == tail[twin]
-    if not alike.any():
-        return triangles, seam
-
-    mirror = np.where(alike, count, 0)
-    rows = np.concatenate((one, one + count))
-    columns = np.concatenate((other + mirror, other + count - mirror))
-    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), (2 * count, 2 * count))
-    _, label = connected_components(graph, directed=False)
-    as_is, flipped = label[:count], label[count:]
-    report.non_orientable = bool((as_is == flipped).any())
-    # Of a component and its mirror image, take the one that holds more faces as they are.
-    kept = np.bincount(as_is, minlength=int(label.max()) + 1)
-    flip = (kept[flipped] > kept[as_is]) | ((kept[flipped] == kept[as_is]) & (flipped < as_is))
-    flip &= as_is != flipped
-    report.flipped_faces = int(flip.sum())
-    # Edges that are still alike after that have no consistent winding at all.
-    torn = edge[alike ^ flip[one] ^ flip[other]]
-    seam[tail[torn]] = seam[head[torn]] = True
-    return np.where(flip[:, None], triangles[:, ::-1], triangles), seam
-
-
 def _canonical_faces(triangles: Indices, count: int) -> Indices:
     """Start each face at its first vertex, winding kept, and sort the faces.
 
-    So the last digit of every sum over faces is the same whatever the order they came in.
+    The last digit of every sum over faces is then the same, whatever order they came in.
     """
     a, b, c = columns(triangles)
     second, third = (b < a) & (b < c), (c < a) & (c < b)
@@ -475,15 +345,10 @@ def _canonical_faces(triangles: Indices, count: int) -> Indices:
     )
     if count < 2**KEY_BITS:
         # Numbers are sorted several times as fast as their order is found.
-        key = np.sort(_face_key(*turned))
+        key = np.sort(face_key(*turned))
         below = 2**KEY_BITS - 1
         turned = (key >> 2 * KEY_BITS, (key >> KEY_BITS) & below, key & below)
     else:
         order = np.lexsort(turned[::-1])
         turned = tuple(corner[order] for corner in turned)
     return np.stack(turned, axis=1)
-
-
-def _face_key(a: Indices, b: Indices, c: Indices) -> Indices:
-    """One number for each face of three vertices below 2^KEY_BITS, (m,)."""
-    return (a << 2 * KEY_BITS) | (b << KEY_BITS) | c

@@ -1,13 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The curvature estimate against surfaces whose curvature is known, and the laws it has to obey.
-
-Sphere: k1 = k2 = 1 / r.
-Torus of radii R > r: k1 = 1 / r along the small circle; the normal leans by v, so the large circle,
-of radius R + r cos v, bends by k2 = cos v / (R + r cos v).
-Ellipsoid x^2/a^2 + y^2/b^2 + z^2/c^2 = 1, as a level set: with w = sum x_i^2 / a_i^4 its Gaussian
-curvature is 1 / (abc w)^2 and its mean (a^2 + b^2 + c^2 - |x|^2) / (2 (abc)^2 w^(3/2)); k1 and k2
-are mean +- sqrt(mean^2 - Gaussian).
-"""
+"""The curvature estimate against surfaces whose curvature is known, and the laws it has to obey."""
 
 import math
 import time
@@ -16,87 +8,25 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
+from small_meshes import (
+    Surface,
+    cone,
+    ellipsoid,
+    grid_triangles,
+    mixed_mesh,
+    moebius,
+    plane,
+    sphere,
+    torus,
+    unweld,
+    uv_sphere,
+)
 
 from cdrf_addon.core.curvature.estimators import DEFAULT_METHOD, libigl, polynomial
 from cdrf_addon.core.curvature.field import CurvatureField, curvature_steps, principal_curvatures
-from cdrf_addon.core.curvature.mesh import TriMesh
-from cdrf_addon.core.curvature.topology import edge_lengths
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 from cdrf_addon.core.errors import ParameterError
 from cdrf_addon.core.progress import run_steps
-from tests.core.test_mesh import grid_triangles, icosphere, moebius, plane, unweld
-
-Surface = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Vertices, faces, and the exact k1 and k2 at the vertices."""
-
-
-# --- surfaces -----------------------------------------------------------------------------------
-
-
-def jitter(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Move the vertices of a unit sphere along it by a random 15 % of an edge, a normal deviate."""
-    rng = np.random.default_rng(3)
-    step = 0.15 * edge_lengths(vertices, faces).mean()
-    moved = vertices + step * rng.normal(size=vertices.shape)
-    return moved / np.linalg.norm(moved, axis=1, keepdims=True)
-
-
-def sphere(level: int, *, irregular: bool) -> Surface:
-    vertices, faces = icosphere(level)
-    if irregular:
-        vertices = jitter(vertices, faces)
-    one = np.ones(len(vertices))
-    return vertices, faces, one, one
-
-
-def ellipsoid(level: int, *, irregular: bool) -> Surface:
-    unit, faces, _, _ = sphere(level, irregular=irregular)
-    axes = np.array((1.0, 0.8, 0.6))
-    vertices = unit * axes
-    w = (unit**2 / axes**2).sum(axis=1)
-    product = axes.prod()
-    mean = ((axes**2).sum() - (vertices**2).sum(axis=1)) / (2.0 * product**2 * w**1.5)
-    split = np.sqrt(np.maximum(mean**2 - 1.0 / (product * w) ** 2, 0.0))
-    return vertices, faces, mean + split, mean - split
-
-
-def torus(level: int, *, irregular: bool) -> Surface:
-    """Radii 1 and 0.4, 2^(level + 1) x 2^level vertices; irregular by a quarter of a cell."""
-    rows, columns = 2 ** (level + 1), 2**level
-    u, v = (grid.ravel() for grid in np.indices((rows, columns)).astype(np.float64))
-    if irregular:
-        rng = np.random.default_rng(5)
-        u, v = (angle + rng.uniform(-0.25, 0.25, angle.shape) for angle in (u, v))
-    u, v = u * 2.0 * math.pi / rows, v * 2.0 * math.pi / columns
-    large, small = 1.0, 0.4
-    out = large + small * np.cos(v)
-    vertices = np.stack((out * np.cos(u), out * np.sin(u), small * np.sin(v)), 1)
-    faces = grid_triangles(rows, columns, wrap=(True, True))
-    return vertices, faces, np.full(len(vertices), 1.0 / small), np.cos(v) / out
-
-
-def uv_sphere(segments: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
-    """A unit sphere as Blender makes it, the poles last but one and last."""
-    polar = np.arange(1, rings) * math.pi / rings
-    around = np.arange(segments) * 2.0 * math.pi / segments
-    a, b = np.meshgrid(polar, around, indexing="ij")
-    body = np.stack((np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)), -1).reshape(-1, 3)
-    faces = grid_triangles(rings - 1, segments, wrap=(False, True))
-    here, after = np.arange(segments), (np.arange(segments) + 1) % segments
-    last, top, bottom = (rings - 2) * segments, len(body), len(body) + 1
-    caps = [np.stack((np.full(segments, top), here, after), 1)]
-    caps.append(np.stack((np.full(segments, bottom), last + after, last + here), 1))
-    return np.vstack((body, (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))), np.vstack((faces, *caps))
-
-
-def cone(segments: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
-    """A cone of 45 degrees, its tip vertex 0, open below; ring i has the radius i / rings."""
-    around = np.arange(segments) * 2.0 * math.pi / segments
-    r, b = np.meshgrid(np.arange(1, rings + 1) / rings, around, indexing="ij")
-    body = np.stack((r * np.cos(b), r * np.sin(b), 1.0 - r), -1).reshape(-1, 3)
-    here, after = np.arange(segments), (np.arange(segments) + 1) % segments
-    tip = np.stack((np.zeros(segments, dtype=np.int64), here + 1, after + 1), 1)
-    faces = grid_triangles(rings, segments, wrap=(False, True)) + 1
-    return np.vstack(((0.0, 0.0, 1.0), body)), np.vstack((tip, faces))
 
 
 def estimate(
@@ -340,19 +270,6 @@ def test_loose_vertices_are_zero_and_no_failure(base) -> None:
 # --- chunks and progress ------------------------------------------------------------------------
 
 
-def mixed_mesh() -> tuple[np.ndarray, np.ndarray]:
-    """A torus, a distant ball, a tetrahedron, a fan, loose vertices and a few bad faces."""
-    around, faces, _, _ = torus(4, irregular=True)
-    ball, sides = icosphere(3)
-    tetrahedron = np.array([(1.0, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
-    fan, blades = cone(300, 2)
-    pieces = [around, ball + 5.0, tetrahedron - 5.0, fan - (0.0, 0.0, 5.0), np.eye(3) * 20.0]
-    of_piece = [faces, sides, np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]), blades]
-    starts = np.cumsum([0] + [len(piece) for piece in pieces])
-    wound = [rows + start for rows, start in zip(of_piece, starts, strict=False)]
-    return np.concatenate(pieces), np.concatenate([*wound, faces[:3], faces[:3, [0, 0, 1]]])
-
-
 def cut_into(monkeypatch, vertices: int) -> None:
     """Let the estimators work on so many vertices at a time."""
     monkeypatch.setattr(libigl, "CHUNK_VERTICES", vertices)
@@ -431,7 +348,7 @@ def test_pieces_too_small_for_a_fit() -> None:
     # Its normals are those of the sphere around it, of radius sqrt(3).
     assert tetrahedron.kappa == pytest.approx(np.full(4, 1.0 / math.sqrt(3.0)), rel=1e-12)
     assert tetrahedron.filled.all()
-    assert tetrahedron.sentences()[-1].startswith("4 of 4 vertices have too little around them")
+    assert tetrahedron.sentences()[-1].startswith("4 of 4 vertices have too few faces around them")
     assert (estimate(corners, faces[:, ::-1]).mean < 0.0).all()
 
 

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cleaning a mesh: what is merged, left out, turned round, refused, and the way back.
-
-The shapes made here serve the other tests of the numerics too.
-"""
+"""Cleaning a mesh: what is merged, left out, turned round, refused, and the way back."""
 
 import math
 import re
@@ -10,9 +7,11 @@ import re
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
+from small_meshes import icosphere, moebius, unweld
 
-from cdrf_addon.core.curvature.mesh import EDGE_LIMIT, CleanMesh, TriMesh, clean, weld
+from cdrf_addon.core.curvature.clean import EDGE_LIMIT, CleanMesh, clean, weld
 from cdrf_addon.core.curvature.topology import edge_lengths
+from cdrf_addon.core.curvature.tri_mesh import TriMesh
 from cdrf_addon.core.errors import MeshError
 
 TOLERANCE = {
@@ -21,77 +20,6 @@ TOLERANCE = {
     # The same mesh at another scale, relative: the scale itself is rounded once.
     "scale": 1e-14,
 }
-
-
-# --- shapes -------------------------------------------------------------------------------------
-
-
-def grid_triangles(rows: int, columns: int, *, wrap: tuple[bool, bool]) -> np.ndarray:
-    """Triangles of a grid of vertices, row by row, closed in the directions of `wrap`."""
-    i, j = np.meshgrid(
-        np.arange(rows if wrap[0] else rows - 1),
-        np.arange(columns if wrap[1] else columns - 1),
-        indexing="ij",
-    )
-    a, b, c, d = (
-        ((i + di) % rows * columns + (j + dj) % columns).ravel()
-        for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1))
-    )
-    return np.concatenate((np.stack((a, b, c), 1), np.stack((a, c, d), 1)))
-
-
-def plane(size: int = 20) -> tuple[np.ndarray, np.ndarray]:
-    """A square of unit cells in the plane z = 0."""
-    x, y = np.meshgrid(np.arange(float(size)), np.arange(float(size)), indexing="ij")
-    vertices = np.stack((x.ravel(), y.ravel(), np.zeros(x.size)), 1)
-    return vertices, grid_triangles(size, size, wrap=(False, False))
-
-
-# An icosahedron's faces over the vertices made in `icosphere`, wound outwards.
-ICOSAHEDRON = """
-0 11 5  0 5 1  0 1 7  0 7 10  0 10 11  1 5 9  5 11 4  11 10 2  10 7 6  7 1 8
-3 9 4  3 4 2  3 2 6  3 6 8  3 8 9  4 9 5  2 4 11  6 2 10  8 6 7  9 8 1
-"""
-
-
-def icosphere(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
-    """A unit sphere, faces wound outwards: an icosahedron, its faces cut in four repeatedly."""
-    g = (1.0 + math.sqrt(5.0)) / 2.0
-    corners = [(-1.0, g), (1.0, g), (-1.0, -g), (1.0, -g)]
-    vertices = np.array([np.roll((x, y, 0.0), turn) for turn in range(3) for x, y in corners])
-    faces = np.array(ICOSAHEDRON.split(), dtype=np.int64).reshape(-1, 3)
-    for _ in range(subdivisions):
-        edges = np.sort(np.concatenate((faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]])), 1)
-        ends, of_face = np.unique(edges, axis=0, return_inverse=True)
-        ab, bc, ca = (of_face.reshape(-1) + len(vertices)).reshape(3, -1)
-        vertices = np.concatenate((vertices, vertices[ends].mean(axis=1)))
-        a, b, c = faces.T
-        quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-        faces = np.concatenate([np.stack(quarter, 1) for quarter in quarters])
-    return vertices / np.linalg.norm(vertices, axis=1, keepdims=True), faces
-
-
-def moebius(length: int = 60, width: int = 8) -> tuple[np.ndarray, np.ndarray]:
-    """A Möbius strip of radius 1 and half-width 0.3."""
-    u, v = np.meshgrid(
-        np.arange(length) * 2.0 * math.pi / length, np.linspace(-0.3, 0.3, width), indexing="ij"
-    )
-    out = 1.0 + v * np.cos(u / 2.0)
-    points = np.stack((out * np.cos(u), out * np.sin(u), v * np.sin(u / 2.0)), -1)
-    # One row more than there is, then name its vertices: the first row the other way round.
-    names = np.arange((length + 1) * width)
-    names[length * width :] = np.arange(width)[::-1]
-    faces = names[grid_triangles(length + 1, width, wrap=(False, False))]
-    return points.reshape(-1, 3), faces
-
-
-def unweld(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Give each face its own vertices, in the order of the original; also each one's original."""
-    corner = np.argsort(faces.ravel(), kind="stable")
-    place = np.empty_like(corner)
-    place[corner] = np.arange(len(corner))
-    original = faces.ravel()[corner]
-    return vertices[original], place.reshape(faces.shape), original
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
@@ -149,52 +77,47 @@ def test_scale_is_taken_out(exponent: int) -> None:
     assert np.array_equal(other.triangles, one.triangles)
 
 
-def test_lengths_of_edges() -> None:
-    lengths = edge_lengths(np.array([(0.0, 0, 0), (3, 0, 0), (3, 4, 0)]), np.array([(0, 1, 2)]))
-    assert lengths.tolist() == [[3.0], [4.0], [5.0]]
-
-
 # --- welding ------------------------------------------------------------------------------------
 
 
 @pytest.mark.smoke
 def test_weld_merges_equal_positions_and_numbers_by_first_appearance() -> None:
     points = np.array([(1.0, 2, 3), (0, 0, 0), (1, 2, 3), (-0.0, 0, -0.0), (1, 2, 4), (0, 0, 0)])
-    group, first = weld(points)
-    assert group.tolist() == [0, 1, 0, 1, 2, 1]
-    assert first.tolist() == [0, 1, 4]
+    welding = weld(points)
+    assert welding.group.tolist() == [0, 1, 0, 1, 2, 1]
+    assert welding.first.tolist() == [0, 1, 4]
 
 
 def test_weld_merges_nothing_that_differs_in_the_last_bit() -> None:
     base = np.full((4, 3), 1.0)
     for axis in range(3):
         base[axis + 1, axis] = math.nextafter(1.0, 2.0)
-    group, first = weld(base)
-    assert group.tolist() == first.tolist() == [0, 1, 2, 3]
+    welding = weld(base)
+    assert welding.group.tolist() == welding.first.tolist() == [0, 1, 2, 3]
     tiny = np.array([(0.0, 0, 0), (5e-324, 0, 0), (-5e-324, 0, 0)])
-    assert weld(tiny)[0].tolist() == [0, 1, 2]
+    assert weld(tiny).group.tolist() == [0, 1, 2]
 
 
 def test_weld_keeps_what_is_not_a_number_apart_from_numbers() -> None:
     nan, inf = math.nan, math.inf
     points = np.array([(0.0, 0, 0), (nan, 0, 0), (inf, 0, 0), (-inf, 0, 0), (0, nan, 0)])
-    group, first = weld(points)
-    assert group.tolist() == first.tolist() == [0, 1, 2, 3, 4]
-    assert weld(points[[1, 0, 1]])[0].tolist() == [0, 1, 0]
+    welding = weld(points)
+    assert welding.group.tolist() == welding.first.tolist() == [0, 1, 2, 3, 4]
+    assert weld(points[[1, 0, 1]]).group.tolist() == [0, 1, 0]
 
 
 def test_weld_is_not_fooled_by_regular_numbers() -> None:
     # Grids, powers of two and swapped axes are what weak hashes collide on.
     axis = np.concatenate((np.arange(-8.0, 9.0), 2.0 ** np.arange(-20, -3)))
     points = np.stack(np.meshgrid(axis, axis, axis), -1).reshape(-1, 3)
-    group, first = weld(points)
-    assert np.array_equal(group, np.arange(len(points)))
-    assert np.array_equal(first, np.arange(len(points)))
+    welding = weld(points)
+    assert np.array_equal(welding.group, np.arange(len(points)))
+    assert np.array_equal(welding.first, np.arange(len(points)))
 
 
 def test_weld_takes_no_points() -> None:
-    group, first = weld(np.zeros((0, 3)))
-    assert group.shape == first.shape == (0,)
+    welding = weld(np.zeros((0, 3)))
+    assert welding.group.shape == welding.first.shape == (0,)
 
 
 @pytest.mark.smoke
@@ -389,21 +312,3 @@ def test_what_cannot_be_used_is_refused_in_a_sentence(
     text = str(refusal.value)
     assert words in text
     assert re.fullmatch(r"[A-Z].*\.", text)
-
-
-def test_a_quad_mesh_with_the_vertices_of_a_triangle_mesh_is_refused() -> None:
-    # libigl itself takes four columns without a word and computes garbage.
-    vertices, _ = plane(4)
-    with pytest.raises(MeshError, match="shape"):
-        TriMesh.from_arrays(vertices, [(0, 4, 5, 1), (1, 5, 6, 2)])
-
-
-def test_other_types_are_converted() -> None:
-    vertices, faces = icosphere(1)
-    mesh = TriMesh.from_arrays(
-        np.asfortranarray(vertices.astype(np.float32)), faces.astype(np.uint32).tolist()
-    )
-    assert mesh.vertices.dtype == np.float64
-    assert mesh.triangles.dtype == np.int64
-    assert mesh.vertices.flags.c_contiguous
-    assert len(clean(mesh).triangles) == len(faces)

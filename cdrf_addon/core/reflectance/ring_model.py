@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The curvature-dependent reflectance of Kubo, Dobashi and Morishima (HCI International 2011).
+"""The ring model: the curvature-dependent reflectance of Kubo, Dobashi and Morishima (2011).
 
 f(theta, sigma) = (E * g_sigma)(theta): the 2 pi-periodic E(theta) = max(cos theta, 0), convolved
 over the whole real line with a Gaussian of standard deviation sigma (paper, Eqs. 3 and 4).
@@ -44,7 +44,7 @@ def series_remainder(sigma: float, terms: int = SERIES_TERMS) -> float:
     return leading / fall if fall > 0.0 else math.inf
 
 
-def reflectance(theta: ArrayLike, sigma: ArrayLike) -> NDArray[np.float64]:
+def ring_reflectance(theta: ArrayLike, sigma: ArrayLike) -> NDArray[np.float64]:
     """Evaluate f(theta, sigma), accurate to 1e-12 absolute for every sigma in [0, inf].
 
     Args:
