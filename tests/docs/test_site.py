@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from rooms import markdown
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -101,6 +102,11 @@ def test_every_room_has_its_row():
     for init in (ROOT / "cdrf_addon").rglob("__init__.py"):
         room = init.parent.relative_to(ROOT / "cdrf_addon").as_posix()
         assert room == "." or f"`{room}/`" in rows, room
+
+
+def test_the_table_of_imports_is_the_one_that_the_code_is_held_to():
+    page = (DOCS / "develop" / "architecture.md").read_text("utf-8")
+    assert markdown() in page, "put rooms.markdown() into docs/develop/architecture.md"
 
 
 def test_names_for_scripts_exist():
