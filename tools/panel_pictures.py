@@ -204,4 +204,5 @@ def main() -> None:
     bpy.app.timers.register(step, first_interval=REDRAW)
 
 
-main()
+if __name__ == "__main__":
+    main()
