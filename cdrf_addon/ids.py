@@ -3,7 +3,7 @@
 
 from typing import Final
 
-# --- stable for artists' scripts (README, "For scripts") ---------------------------------------
+# --- stable for artists' scripts (docs/pipeline/scripts.md) ---------------------------------------
 CURVATURE_ATTRIBUTE: Final = "cdrf_curvature"
 """FLOAT_COLOR point attribute: kappa, k1, k2, signed mean, per world unit."""
 DIFFUSED_ATTRIBUTE: Final = "cdrf_diffused"
