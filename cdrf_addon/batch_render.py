@@ -4,7 +4,7 @@
     python -m cdrf_addon.batch_render --help
     blender --background --python cdrf_addon/batch_render.py -- --help
 
-The work is done in `command/batch.py`; this file is the name that scripts and farms know it by.
+The work is done in `command/batch_run.py`; this file is the name that scripts and farms know it by.
 """
 
 from __future__ import annotations
@@ -12,12 +12,21 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-if not __package__:  # run as a file: make the package importable, then go on inside it
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-    __package__ = "cdrf_addon"
+if not __package__:  # run as a file
+    folder = Path(__file__).resolve().parent
+    # An installed extension has another name; by this one Blender would have the code twice.
+    loaded = (
+        name
+        for name, module in sys.modules.items()
+        if name.endswith(f".{folder.name}")
+        and Path(getattr(module, "__file__", None) or "").resolve().parent == folder
+    )
+    __package__ = next(loaded, folder.name)
+    if __package__ == folder.name:
+        sys.path.insert(0, str(folder.parent))
 
-from cdrf_addon.command.batch import main
-from cdrf_addon.command.console import leave
+from .command.batch_run import main
+from .command.console import leave
 
 if __name__ == "__main__":
     leave(main())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All differences between Blender 4.5 LTS and 5.2 LTS; nothing else asks for the version."""
+"""All differences between Blender 4.5 LTS and 5.2 LTS; no other module reads the version."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT
 
 
 HAS_RAYCAST = bpy.app.version >= (5, 1, 0)
-"""Whether shader trees know the Raycast node, which coloured shadow edges need."""
+"""Whether shader trees have the Raycast node, which coloured shadow edges need."""
 
 
 INSTANCER_LINKS = bpy.app.version >= (5, 0, 0)
-"""Whether an instance's lights are linked as the instancing empty is, not as they are themselves.
-
-Measured on 4.5 and 5.2."""
+"""Whether an instance's lights follow the light linking of the instancing empty, not their own;
+measured on 4.5 and 5.2."""
 
 
 def set_still_format(settings: bpy.types.ImageFormatSettings, kind: str) -> None:
@@ -32,7 +31,7 @@ def set_still_format(settings: bpy.types.ImageFormatSettings, kind: str) -> None
 
 @contextmanager
 def still_png(scene: bpy.types.Scene) -> Iterator[None]:
-    """Inside the block, EEVEE renders a whole, plain, single 8-bit PNG; then all is as before.
+    """Render a whole, plain, single 8-bit PNG with EEVEE inside the block; restore all after it.
 
     Formats depend on the media type, which is new in 5.0, so that comes first both ways.
     """
@@ -85,31 +84,31 @@ def animation_curves(tree: bpy.types.ID, path: str) -> list[bpy.types.FCurve]:
 
 
 def walk_method(method: str) -> str:
-    """Name a subsurface method as the newest Blender does.
+    """Return the name that the newest Blender has for a subsurface method.
 
-    What was the random walk is called legacy since another took its name, with a longer reach.
+    The former random walk is called legacy since another, with a longer reach, has its name.
     """
     node = bpy.types.ShaderNodeSubsurfaceScattering
-    known = {item.identifier for item in node.bl_rna.properties["falloff"].enum_items}
+    known = {each.identifier for each in node.bl_rna.properties["falloff"].enum_items}
     legacy = "RANDOM_WALK_LEGACY"
     return legacy if method == "RANDOM_WALK" and legacy not in known else method
 
 
 def uses_nodes(material: bpy.types.Material | bpy.types.World) -> bool:
-    """Tell whether the renderer looks at a material's or world's nodes; always so from 5.0 on."""
+    """Return whether the renderer uses a material's or world's nodes; always so from 5.0 on."""
     if material.node_tree is None:
         return False
     return bpy.app.version >= (5, 0, 0) or material.use_nodes
 
 
 def set_uses_nodes(material: bpy.types.Material, value: bool) -> None:
-    """Switch a 4.5 material between its nodes and its plain viewport colour."""
+    """Switch a 4.5 material between its nodes and its plain viewport colour; 5.0 has no switch."""
     if bpy.app.version < (5, 0, 0) and material.use_nodes != value:
         material.use_nodes = value
 
 
 def set_equirectangular(camera: bpy.types.Camera) -> None:
-    """Make a camera see all around; the setting was Cycles' own before 5.0."""
+    """Make a camera equirectangular; before 5.0 the setting was Cycles' own."""
     camera.type = "PANO"
     owner = camera if hasattr(camera, "panorama_type") else camera.cycles
     owner.panorama_type = "EQUIRECTANGULAR"

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every name that is written into a .blend or that a script may rely on, once."""
+"""Every name that is written into a .blend or that a script may rely on, once each."""
 
 from typing import Final
 
-# --- stable for artists' scripts (README, "For scripts") ---------------------------------------
+# --- stable for artists' scripts (docs/pipeline/scripts.md) ---------------------------------------
 CURVATURE_ATTRIBUTE: Final = "cdrf_curvature"
 """FLOAT_COLOR point attribute: kappa, k1, k2, signed mean, per world unit."""
 DIFFUSED_ATTRIBUTE: Final = "cdrf_diffused"
-"""FLOAT_COLOR point attribute: kappa at four diffusion lengths (core/scale_space.py)."""
+"""FLOAT_COLOR point attribute: kappa at four diffusion lengths (core/curvature/scale_space.py)."""
 FILLED_ATTRIBUTE: Final = "cdrf_filled"
 """FLOAT point attribute: 1 where no fit was possible; only on meshes that have such vertices."""
 LENGTH_ATTRIBUTE: Final = "cdrf_length"
-"""FLOAT point attribute: the shortest of those lengths, in world units. Not a custom property, as
-many modifiers make a mesh without them."""
+"""FLOAT point attribute: the shortest of those lengths, in world units. Not a custom property,
+which many modifiers drop."""
 
 # --- node groups and images: all start with CDRF ------------------------------------------------
 PREFIX: Final = "CDRF"
@@ -22,28 +22,29 @@ NODE: Final = "CDRF"
 OUTPUT_NODE: Final = "CDRF Output"
 DISPLAY_NODE: Final = "CDRF Curvature Display"
 
-# Custom properties by which the extension knows its own data again, whatever its name by then.
+# Custom properties by which the extension finds its own data, however it was renamed.
 ROLE_KEY: Final = "cdrf_role"
 VERSION_KEY: Final = "cdrf_version"
 CHANNELS_KEY: Final = "cdrf_channels"
 SOURCE_KEY: Final = "cdrf_curvature_source"
 SCENE_KEY: Final = "cdrf_scene"
 MODEL_KEY: Final = "cdrf_model"
-"""On a table and on a shader group: key of the reflectance model (core/models.py)."""
+"""On a table and on a shader group: key of the reflectance model (core/reflectance/models.py)."""
 COLOUR_KEY: Final = "cdrf_model_colour"
 MOMENTS_KEY: Final = "cdrf_model_moments"
 GAIN_KEY: Final = "cdrf_model_gain"
 LOOKUPS_KEY: Final = "cdrf_lookups"
 """On a light's branch: which channels share a look-up."""
 DISPLAY_KEY: Final = "cdrf_display"
-"""On a scene that shows curvature: what, over which range, and the view settings before."""
+"""On a scene that shows curvature: the quantity, its range, and the former view settings."""
 LIGHT_KEY: Final = "cdrf_light_kind"
 EXCLUDED_KEY: Final = "cdrf_excluded"
-"""On a light's branch that some view layers leave out: its collections' flags (lights.py)."""
+"""On a light's branch that some view layers leave out: paths of its collections' flags
+(blender/material/lighting.py)."""
 WORLD_KEY: Final = "cdrf_world"
 """On a shader group: fingerprint of the world whose light is wired in; "" for none."""
 WORLD_LIGHT_KEY: Final = "cdrf_world_light"
-"""On a shader group: that light, as JSON (blender/world.py)."""
+"""On a shader group: that light, as JSON (blender/world/light.py)."""
 WORLD_DATA_KEY: Final = "cdrf_world_data"
 """On a shader group: the world that drives its strength."""
 MAPPED_KEY: Final = "cdrf_mapped"
@@ -58,7 +59,7 @@ INSTANCED_KEY: Final = "cdrf_instanced"
 LINKS_KEY: Final = "cdrf_light_links"
 """On a shader group: the lights with light linking that it has."""
 BIT_KEY: Final = "cdrf_light_bit"
-"""On a light's branch: which bit of an object's UNLIT_KEY takes the light away; -1 for none."""
+"""On a light's branch: which bit of an object's UNLIT_KEY switches the light off; -1 for none."""
 UNLIT_KEY: Final = "cdrf_unlit"
 """On an object: lights it does not receive, as a sum of powers of two. An object without it
 receives all, as an absent property reads as 0."""
@@ -70,7 +71,7 @@ SHADOW_KEY: Final = "cdrf_shadow"
 EDGE_KEY: Final = "cdrf_shadow_edges"
 """On a shader group: its shadows have coloured edges."""
 SHADOW_WORLD_KEY: Final = "cdrf_shadow_world"
-"""On a shader group with shadows: what the world adds to a shadow's measurement is taken off."""
+"""On a shader group with shadows: the world's part in a shadow's measurement is subtracted."""
 
 ROLE_SHADER: Final = "shader"
 ROLE_DISPLAY: Final = "display"

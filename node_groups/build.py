@@ -19,7 +19,7 @@ sys.path.insert(0, str(HERE.parent))
 
 import bpy  # noqa: E402  (the checkout must be importable first)
 
-from cdrf_addon.blender.material.specular import under_gloss_group  # noqa: E402
+from cdrf_addon.blender.material.specular import under_specular_group  # noqa: E402
 from cdrf_addon.blender.nodes.curvature import diffused_group, display_group  # noqa: E402
 from cdrf_addon.blender.nodes.detail import detail_group  # noqa: E402
 from cdrf_addon.blender.nodes.harmonics import bands_group, harmonics_group  # noqa: E402
@@ -81,7 +81,7 @@ def build_all() -> list[bpy.types.ShaderNodeTree]:
             (profile(), "RGB"),
         )
     ]
-    built += [harmonics_group(), detail_group(), under_gloss_group()]
+    built += [harmonics_group(), detail_group(), under_specular_group()]
     built.append(diffused_group())
     built += [lit_group(translucent=translucent) for translucent in (False, True)]
     built += [display_group(signed=signed) for signed in (False, True)]

@@ -44,7 +44,7 @@ BUILDER = "*/scripts/addons_core/bl_pkg/cli/blender_ext.py"
 
 @dataclass(frozen=True)
 class Built:
-    """A finished zip, for the table at the end."""
+    """A finished zip: a row of the table that is printed at the end."""
 
     path: Path
     wheels: int
@@ -52,7 +52,11 @@ class Built:
 
 
 def find_builder() -> Path:
-    """Find Blender's extension tool inside the installed bpy wheel, without importing bpy."""
+    """Find Blender's extension builder inside the installed bpy wheel, without importing bpy.
+
+    Raises:
+        BuildError: There is none.
+    """
     spec = importlib.util.find_spec("bpy")
     for folder in (spec and spec.submodule_search_locations) or ():
         for builder in Path(folder).glob(BUILDER):
@@ -63,7 +67,7 @@ def find_builder() -> Path:
 def target_manifest(
     manifest: dict[str, Any], target: Target, wheels: Sequence[Wheel]
 ) -> dict[str, Any]:
-    """Narrow the authors' manifest to one zip."""
+    """Narrow the authors' manifest to one zip: its platform, Blender versions and wheels."""
     release = PYTHONS[target.python]
     narrowed = {
         **manifest,
@@ -77,7 +81,7 @@ def target_manifest(
 
 
 def manifest_text(manifest: dict[str, Any]) -> str:
-    """Write a manifest as TOML; it has strings, lists of strings and tables of those."""
+    """Return a manifest as TOML; it holds strings, lists of strings and tables of those."""
     tables = {key: value for key, value in manifest.items() if isinstance(value, dict)}
     lines = [_toml_line(key, value) for key, value in manifest.items() if key not in tables]
     for name, table in tables.items():
@@ -91,14 +95,18 @@ def _toml_line(key: str, value: str | list[str]) -> str:
 
 
 def project_files() -> list[Path]:
-    """List what git tracks or would track, so that caches and results never ship."""
-    # The owner of the checkout may be another user (a container, CI); reading it is still fine.
+    """List the files that git tracks or would track, so that caches and results never ship.
+
+    Raises:
+        BuildError: Git is missing or cannot list them.
+    """
+    # The checkout may belong to another user (a container, CI); reading it is safe all the same.
     command = ["git", "-c", f"safe.directory={ROOT}", "-C", str(ROOT), "ls-files", "-z"]
     command += ["--cached", "--others", "--exclude-standard"]
     try:
         listing = subprocess.run(command, capture_output=True, check=True).stdout
     except FileNotFoundError:
-        raise BuildError("git is needed to tell which files belong to the extension.") from None
+        raise BuildError("git is needed to list the files of the extension; install it.") from None
     except subprocess.CalledProcessError as error:
         reason = error.stderr.decode(errors="replace").strip()
         raise BuildError(f"git could not list the files of the checkout: {reason}") from None
@@ -107,7 +115,14 @@ def project_files() -> list[Path]:
 
 
 def stage(folder: Path, files: Sequence[Path], manifest: str, wheels: Sequence[Path]) -> None:
-    """Lay out in `folder` the clean copy that the builder packs."""
+    """Copy to `folder` what the builder packs.
+
+    Args:
+        folder: An empty folder.
+        files: Files of the checkout, relative to it.
+        manifest: Text of the manifest.
+        wheels: The wheels to bundle.
+    """
     for file in files:
         copy = folder / file
         copy.parent.mkdir(parents=True, exist_ok=True)
@@ -119,7 +134,11 @@ def stage(folder: Path, files: Sequence[Path], manifest: str, wheels: Sequence[P
 
 
 def run_builder(builder: Path, *arguments: str) -> None:
-    """Run one command of Blender's tool; raise with its words if it fails."""
+    """Run one command of Blender's builder.
+
+    Raises:
+        BuildError: It failed; the error quotes its output.
+    """
     command = [sys.executable, str(builder), *arguments]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     if run.returncode:
@@ -128,7 +147,17 @@ def run_builder(builder: Path, *arguments: str) -> None:
 
 
 def build(target: Target, wheels: Sequence[Wheel], builder: Path, output_dir: Path) -> Built:
-    """Build and validate the zip of one target."""
+    """Build and validate the zip of one target.
+
+    Args:
+        target: Python and platform.
+        wheels: The locked wheels of that target.
+        builder: Blender's extension builder.
+        output_dir: Folder for the zip, made if it is not there.
+
+    Raises:
+        BuildError: A wheel cannot be downloaded, or the builder refuses.
+    """
     start = time.perf_counter()
     manifest = tomllib.loads((ROOT / MANIFEST).read_text(encoding="utf-8"))
     text = manifest_text(target_manifest(manifest, target, wheels))
@@ -143,7 +172,7 @@ def build(target: Target, wheels: Sequence[Wheel], builder: Path, output_dir: Pa
 
 
 def print_table(zips: Sequence[Built]) -> None:
-    """Print what was built."""
+    """Print the zips as a table."""
     width = max(len(built.path.name) for built in zips)
     print(f"{'zip':<{width}}  {'MB':>6}  wheels  seconds")
     for built in zips:
@@ -154,7 +183,7 @@ def print_table(zips: Sequence[Built]) -> None:
 
 
 def update_lock(targets: Sequence[Target]) -> None:
-    """Lock the pinned wheels anew for `targets` and keep the lock of the others."""
+    """Lock the pinned wheels of `targets` anew; keep the lock of the others."""
     kept = []
     if len(targets) < len(all_targets()):
         kept = [wheel for wheel in read_lock() if wheel.target not in targets]
@@ -174,7 +203,11 @@ def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def selected_targets(options: argparse.Namespace) -> list[Target]:
-    """Apply --platform and --python."""
+    """Return the targets that --platform and --python leave.
+
+    Raises:
+        BuildError: None is left.
+    """
     targets = [
         target
         for target in all_targets()

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Print the Debian packages that EEVEE still needs on this machine, on one line.
+"""Print the Debian packages that EEVEE still needs here, on one line.
 
 `import bpy` fails on the first library that it is linked to and cannot find, and a render aborts
-the process when EGL is missing or has no driver. So this looks before either is tried, and does
-not import bpy. It prints nothing when all is there, and always on systems other than Linux.
+the process when EGL is missing or has no driver. So this checks before either is tried, and does
+not import bpy. It prints nothing where all is there, nor on systems other than Linux.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ PACKAGES = {
     "libxkbcommon.so.0": "libxkbcommon0",
 }
 EGL_LOADER = "libegl1"
-# The driver that renders in software; a vendor's own driver passes the check without it.
+# The software renderer; with a vendor's driver the check passes without it.
 EGL_DRIVER = ["libegl-mesa0", "libgl1-mesa-dri"]
 EGL_PLATFORM_SURFACELESS = 0x31DD
 
 
 def missing_linked() -> set[str]:
-    """Name the libraries that bpy is linked to and that the loader does not find."""
+    """Return the libraries that bpy is linked to and the loader does not find."""
     spec = importlib.util.find_spec("bpy")
     if spec is None or spec.origin is None:
         raise SystemExit("system_libraries: this Python has no bpy wheel.")
@@ -47,7 +47,7 @@ def missing_linked() -> set[str]:
 
 
 def egl_packages() -> list[str]:
-    """Name what EGL needs to start without a display; bpy opens it only when it renders."""
+    """Return what EGL needs to start without a display; bpy loads it only when it renders."""
     try:
         egl = ctypes.CDLL("libEGL.so.1")
     except OSError:
@@ -66,7 +66,7 @@ def egl_packages() -> list[str]:
 
 
 def main() -> None:
-    """Print the packages; stop with a sentence when a library has no known package."""
+    """Print the packages; exit with a sentence if no package is known for a library."""
     if sys.platform != "linux":
         return
     missing = missing_linked()

@@ -24,7 +24,7 @@ CACHE_DIR = ROOT / "wheels"
 
 
 class BuildError(Exception):
-    """A failure that one sentence explains; shown without a traceback."""
+    """A failure that one sentence explains; printed without a traceback."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Wheel:
 
 
 def all_targets() -> list[Target]:
-    """Every zip that a full build makes, in the order of its output."""
+    """List every zip that a full build makes, in the order of its output."""
     return [
         Target(python, platform)
         for python in PYTHONS
@@ -96,7 +96,11 @@ def read_pins(path: Path = PINS_FILE) -> dict[str, str]:
 
 
 def read_lock(path: Path = LOCK_FILE) -> list[Wheel]:
-    """Read the locked wheels."""
+    """Read the locked wheels.
+
+    Raises:
+        BuildError: The lock is missing or damaged.
+    """
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -107,7 +111,7 @@ def read_lock(path: Path = LOCK_FILE) -> list[Wheel]:
 
 
 def write_lock(wheels: list[Wheel], path: Path = LOCK_FILE) -> None:
-    """Write the lock, in an order that keeps differences small."""
+    """Write the lock, sorted so that differences stay small."""
     lines = ["# Written by tools/build_extension.py --update-lock; do not edit.\n"]
     for wheel in sorted(wheels, key=lambda w: (w.python, w.platform, w.name)):
         lines.append("\n[[wheel]]\n")
@@ -117,7 +121,11 @@ def write_lock(wheels: list[Wheel], path: Path = LOCK_FILE) -> None:
 
 
 def lock_targets(targets: list[Target]) -> list[Wheel]:
-    """Download the pinned packages for `targets` and describe what came."""
+    """Download the pinned packages for `targets`; return their wheels.
+
+    Raises:
+        BuildError: One cannot be downloaded.
+    """
     wheels = []
     for target in targets:
         for name, version in read_pins().items():
@@ -128,9 +136,13 @@ def lock_targets(targets: list[Target]) -> list[Wheel]:
 
 
 def fetch(wheel: Wheel) -> Path:
-    """Return the cached file of `wheel`, downloaded if need be, its checksum verified."""
+    """Return the cached file of `wheel`; download it if needed, and verify its checksum.
+
+    Raises:
+        BuildError: It cannot be downloaded, or is not the file that was locked.
+    """
     cached = CACHE_DIR / wheel.file
-    # A damaged file in the cache is simply fetched again; only a fresh one that differs is news.
+    # A damaged file in the cache is downloaded again; only a fresh one that differs is an error.
     if cached.is_file() and _sha256(cached) == wheel.sha256:
         return cached
     file = _download(wheel.name, wheel.version, wheel.target)
@@ -154,7 +166,7 @@ def _sha256(path: Path) -> str:
 
 
 def _download(name: str, version: str, target: Target) -> Path:
-    """Let pip fetch one wheel for a foreign platform into the cache."""
+    """Let pip download one wheel, of any platform, into the cache."""
     CACHE_DIR.mkdir(exist_ok=True)
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check"]
     command += ["--no-deps", "--only-binary=:all:", "--implementation=cp"]
@@ -176,12 +188,12 @@ def _download(name: str, version: str, target: Target) -> Path:
 
 
 def _explain_pip(stderr: str, what: str, target: Target) -> str:
-    """Turn pip's error output into the sentence that the reader can act on."""
+    """Turn pip's error output into a sentence that the reader can act on."""
     if "No module named pip" in stderr:
         return "This Python has no pip; run the build as ./dev build."
     wanted = f"{what} for {target.python} on {target.platform}"
     # pip reports an unreachable index as "no versions"; the retries before it tell them apart.
     if "Retrying" in stderr or "connection" in stderr.lower():
         return f"Could not download {wanted}: the package index cannot be reached."
-    last = stderr.strip().splitlines()[-1] if stderr.strip() else "it gave no reason"
+    last = stderr.strip().splitlines()[-1] if stderr.strip() else "it printed no reason"
     return f"pip could not download {wanted}: {last}."

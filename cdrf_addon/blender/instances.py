@@ -6,9 +6,9 @@ from __future__ import annotations
 import bpy
 
 
-def is_instance(item: bpy.types.Object) -> bool:
-    """Tell whether an object is an empty that instances a collection."""
-    return item.instance_type == "COLLECTION" and item.instance_collection is not None
+def is_instance(obj: bpy.types.Object) -> bool:
+    """Return whether an object is an empty that instances a collection."""
+    return obj.instance_type == "COLLECTION" and obj.instance_collection is not None
 
 
 def shown_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
@@ -16,8 +16,8 @@ def shown_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     found = dict.fromkeys(view_layer.objects)
     pending = list(found)
     while pending:
-        item = pending.pop()
-        for part in item.instance_collection.all_objects if is_instance(item) else ():
+        obj = pending.pop()
+        for part in obj.instance_collection.all_objects if is_instance(obj) else ():
             if part not in found:
                 found[part] = None
                 pending.append(part)

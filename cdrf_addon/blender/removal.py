@@ -8,13 +8,13 @@ from collections.abc import Iterable
 import bpy
 
 from .. import ids
-from .display import curvature as display
 from .display import viewport
+from .display.curvature import hide, show_surface, shows_curvature
 from .material import linking
 from .material.install import remove, require_editable
-from .material.model import remove_unused
+from .material.shader_group import remove_unused
+from .material.translucent import translucent_materials_of, translucent_materials_on
 from .mesh.attributes import remove_curvature
-from .setup import skins_of, skins_on
 
 
 def remove_translucency(
@@ -32,13 +32,13 @@ def remove_translucency(
     chosen = set(materials)
     for material in chosen:
         require_editable(material)
-    users = [obj for obj in bpy.data.objects if chosen & set(skins_on(obj))]
+    users = [obj for obj in bpy.data.objects if chosen & set(translucent_materials_on(obj))]
     for material in chosen:
-        display.show_skin(material)
+        show_surface(material)
         remove(material)
     _end_unused_display(context)
     for obj in users:
-        if not skins_on(obj) and obj.is_editable and obj.data.is_editable:
+        if not translucent_materials_on(obj) and obj.is_editable and obj.data.is_editable:
             _forget_curvature(obj)
     linking.write_unlit()
     remove_unused()
@@ -46,8 +46,10 @@ def remove_translucency(
 
 def _end_unused_display(context: bpy.types.Context) -> None:
     """Restore the view settings and the viewport if no material shows its curvature any more."""
-    if not any(display.shows_curvature(material) for material in skins_of(context.view_layer)):
-        display.hide(())
+    if not any(
+        shows_curvature(material) for material in translucent_materials_of(context.view_layer)
+    ):
+        hide(())
         viewport.restore(context)
 
 

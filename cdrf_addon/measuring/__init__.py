@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Path-traced spheres of a material: a process of its own, its cache, and the figure."""
+"""Measure spheres by path tracing in a Blender of their own, keep the tables, and draw the fits."""

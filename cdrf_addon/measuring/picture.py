@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The picture of a fit: beside the .blend as a PNG, packed in it as an image, and on the screen."""
+"""The picture of a fit: a PNG beside the .blend, an image packed in it, and on the screen."""
 
 from __future__ import annotations
 
@@ -15,24 +15,29 @@ from .plot import open_in_blender
 
 
 def picture_path(material: bpy.types.Material, folder: Path) -> Path:
-    """Where a material's picture goes: beside the .blend, or to a folder while it is not saved."""
+    """Return a material's PNG: beside the .blend, or in a folder while that is not saved."""
     name = f"cdrf_fit_{bpy.path.clean_name(material.name)}.png"
     return Path(bpy.path.abspath("//")) / name if bpy.data.is_saved else folder / name
 
 
-def make_picture(model: MeasuredModel, fit: MaterialFit, scale: float, path: Path) -> Path:
-    """Draw the fit of the sphere of that scale, write the PNG and bring it into the file.
+def make_picture(model: MeasuredModel, fit: MaterialFit, scale: float, path: Path) -> None:
+    """Draw a fit, write the PNG and load it into the file.
+
+    Args:
+        model: The measured model.
+        fit: Fits to the same measurement.
+        scale: Of the sphere to show; see `draw_fit`.
+        path: The PNG.
 
     Raises:
         OSError: The file cannot be written.
     """
     draw_fit(model, fit, path, scale)
     open_in_blender(path, ids.FIT_IMAGE)
-    return path
 
 
 def show_picture(context: bpy.types.Context) -> None:
-    """Show the picture in an image editor: one that is open, else in a window of its own."""
+    """Show the picture in an open image editor, else in a new window."""
     image = bpy.data.images.get(ids.FIT_IMAGE)
     if image is None or context.window is None or bpy.app.background:
         return

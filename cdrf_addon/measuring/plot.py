@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Diagrams: axes, curves and text, written as PNG by Blender's own font and image libraries."""
+"""Diagrams: axes, curves and text, written as PNG with Blender's own font and image modules."""
 
 from __future__ import annotations
 
@@ -21,13 +21,22 @@ Array = NDArray[np.float64]
 INK: Colour = (0.13, 0.13, 0.15)
 FAINT: Colour = (0.87, 0.87, 0.89)
 FRAME: Colour = (0.45, 0.45, 0.48)
-# Text this much lower than its line's middle is centred on it, in sizes.
+# How far below a line's middle the baseline of centred text lies, in sizes.
 BASELINE = 0.36
 
 
 @dataclass(frozen=True)
 class Text:
-    """A line of text; `anchor` is the part of its width that lies left of x."""
+    """A line of text.
+
+    Attributes:
+        x: Pixels from the left.
+        y: Of the baseline, pixels from the bottom.
+        text: The line.
+        size: Pixels.
+        anchor: Part of its width that lies left of x.
+        colour: Display values.
+    """
 
     x: float
     y: float
@@ -39,7 +48,7 @@ class Text:
 
 @dataclass
 class Picture:
-    """A raster and the text that is set on it when it is written."""
+    """A raster, and the text that is drawn on it when the file is written."""
 
     width: int
     height: int
@@ -51,11 +60,11 @@ class Picture:
     def write(
         self, x: float, y: float, text: str, size: float, anchor: float = 0.0, colour: Colour = INK
     ) -> None:
-        """Put a line of text, its baseline at y."""
+        """Add a line of text, its baseline at y; see `Text`."""
         self.texts.append(Text(x, y, text, size, anchor, colour))
 
     def save(self, path: Path) -> None:
-        """Write the picture as a PNG; needs no window.
+        """Write the picture as a PNG; no window is needed.
 
         Raises:
             OSError: The file cannot be written.
@@ -91,7 +100,7 @@ def _save_pixels(values: Array, path: Path) -> None:
 
 
 def open_in_blender(path: Path, name: str) -> bpy.types.Image:
-    """Load a PNG as an image of the file, packed, in place of an earlier one of that name."""
+    """Load a PNG as a packed image of the file; it replaces an earlier one of that name."""
     image = bpy.data.images.load(str(path))
     image.pack()
     if (old := bpy.data.images.get(name)) is not None:
@@ -103,15 +112,15 @@ def open_in_blender(path: Path, name: str) -> bpy.types.Image:
 
 @dataclass
 class Axes:
-    """A frame on a picture with a linear or logarithmic scale along each side.
+    """A frame on a picture with linear or logarithmic scales.
 
     Attributes:
-        picture: Where it is drawn.
-        box: Left, bottom, right, top in pixels.
+        picture: The picture to draw on.
+        box: Left, bottom, right, top, pixels.
         x: Least and greatest value across.
         y: Least and greatest value upwards.
-        size: Of the numbers, pixels.
-        logarithmic: Both sides.
+        size: Of the text, pixels.
+        logarithmic: Whether both scales are.
     """
 
     picture: Picture
@@ -122,7 +131,7 @@ class Axes:
     logarithmic: bool = False
 
     def place(self, x: Array, y: Array) -> Array:
-        """Pixels of values, (n, 2)."""
+        """Return the pixels of values, (n, 2)."""
         left, bottom, right, top = self.box
         return np.stack(
             (
@@ -145,7 +154,14 @@ class Axes:
         x_name: str = "",
         y_name: str = "",
     ) -> None:
-        """Draw the frame, lines at the marks, their numbers, and the names of the sides."""
+        """Draw the frame, lines at the marks, their labels, and the names of the axes.
+
+        Args:
+            x_marks: Value and label of each mark across.
+            y_marks: The same upwards.
+            x_name: Name of the axis across.
+            y_name: Name of the axis upwards.
+        """
         left, bottom, right, top = self.box
         raster, size = self.picture.raster, self.size
         for value, text in x_marks:
@@ -166,13 +182,13 @@ class Axes:
     def curve(
         self, x: Array, y: Array, colour: Colour, width: float = 2.0, dash: Sequence[float] = ()
     ) -> None:
-        """Draw a curve, inside the frame."""
+        """Draw a curve, clipped to the frame."""
         self.picture.raster.line(self.place(x, y), colour, width, dash=dash, clip=self.box)
 
     def points(
         self, x: Array, y: Array, errors: Array | None, colour: Colour, radius: float = 2.6
     ) -> None:
-        """Draw points with bars of one standard error; those outside the frame are left out."""
+        """Draw points with bars of one standard error; leave out those outside the frame."""
         inside = (y >= self.y[0]) & (y <= self.y[1]) & (x >= self.x[0]) & (x <= self.x[1])
         if errors is not None:
             lows, highs = self.place(x, y - errors), self.place(x, y + errors)

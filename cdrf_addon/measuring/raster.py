@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Antialiased lines and points in an array of pixels: Blender has no matplotlib."""
+"""Antialiased lines and discs in an array of pixels: Blender ships no plotting library."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ class Raster:
         dash: Sequence[float] = (),
         clip: tuple[float, float, float, float] | None = None,
     ) -> None:
-        """Draw a line through (n, 2) points; what is outside left, bottom, right, top is left out.
+        """Draw a line through (n, 2) points.
 
         Args:
             points: Corners, pixels.
             colour: Display values.
             width: Pixels.
             dash: Lengths drawn and left out, in turn, pixels.
-            clip: Box outside which nothing is drawn.
+            clip: Left, bottom, right, top; nothing is drawn outside.
         """
         corners = np.asarray(points, dtype=np.float64)
         for part in _dashes(corners, dash) if dash else [corners]:
@@ -69,7 +69,7 @@ class Raster:
     ) -> None:
         height, across = self.pixels.shape[:2]
         box = clip or (0.0, 0.0, float(across), float(height))
-        # One mask for the whole line, so that joints are not painted twice.
+        # One mask for the whole line, so that joints are not blended twice.
         low = np.maximum(np.floor(corners.min(axis=0) - width - 1.0), np.floor(box[:2]))
         high = np.minimum(np.ceil(corners.max(axis=0) + width + 1.0), np.ceil(box[2:]))
         left, bottom = (max(int(value), 0) for value in low)
@@ -87,7 +87,7 @@ class Raster:
 
 
 def _cover(mask: Array, start: Array, end: Array, width: float) -> None:
-    """Raise a mask to how far a segment with round ends covers each pixel."""
+    """Raise a mask to the part of each pixel that a segment with round ends covers."""
     height, across = mask.shape
     reach = width / 2.0 + 1.0
     left = max(math.floor(min(start[0], end[0]) - reach), 0)
@@ -107,7 +107,7 @@ def _cover(mask: Array, start: Array, end: Array, width: float) -> None:
 
 
 def _dashes(corners: Array, dash: Sequence[float]) -> list[Array]:
-    """Cut a line into the parts that are drawn."""
+    """Cut a line into the dashes that are drawn."""
     lengths = np.hypot(*np.diff(corners, axis=0).T)
     walked = np.concatenate(([0.0], np.cumsum(lengths)))
     parts, place, number = [], 0.0, 0

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The child process of `measure`: path-traces a grid of unit spheres and adds up their pixels.
+"""Path-trace a grid of unit spheres and sum their pixels: the child process of `measure_steps`.
 
     blender --background --factory-startup --python worker.py -- order.json
     python worker.py order.json           (with bpy as a module)
 
-It stands alone, so that nothing but Blender and NumPy has to be found. The order is a JSON object
+It imports nothing of ours, so that only Blender and NumPy have to be found. The order is JSON
 (see `process.write_order`); the answer is an .npz with, for every sphere of radius 1,
 
     cosine   (P,)       N.L of each pixel's centre, by the sphere's equation
@@ -12,7 +12,7 @@ It stands alone, so that nothing but Blender and NumPy has to be found. The orde
     square   (S, P, 3)  sum over the passes of its square
 
 where the pixels of every direction of the light follow one another. Passes of one direction differ
-by their seed alone, so their scatter is the Monte-Carlo error.
+by their seed alone, so their scatter is the Monte Carlo error.
 """
 
 from __future__ import annotations
@@ -34,29 +34,30 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 PROGRESS = "CDRF-PROGRESS"
-# Width of a sphere's cell in radii.
+"""First word of a line of progress; `process.PROGRESS` is the same."""
+# Width of a sphere's cell, in radii.
 PITCH = 2.1
-# How far out a pixel may be: nearer to the outline Cycles loses paths whose refracted direction
-# misses the facet (15 % at 0.984, 40 % at 0.996), which is no scattering.
+# How far out a pixel may be, in radii: nearer to the outline Cycles loses paths whose refracted
+# direction misses the facet (15 % at 0.984, 40 % at 0.996), which is no scattering.
 RIM = 0.96
 SUBDIVISIONS = 7
 
 
-def tell(part: float, text: str) -> None:
-    """Say how far the work is, to the parent."""
+def report(part: float, text: str) -> None:
+    """Report progress to the parent process: the part done, from 0 to 1, and what is being done."""
     print(PROGRESS, f"{part:.4f}", text, flush=True)
 
 
 def towards_light(elevation: float) -> Array:
-    """Direction to the sun; at elevation 0 it is +X, across the camera's, which looks along -Z."""
+    """Return the direction to the sun, (3,); at elevation 0 it is +X; the camera looks along -Z."""
     return np.array([math.cos(elevation), 0.0, math.sin(elevation)])
 
 
 def pixel_normals(across: int, down: int) -> tuple[NDArray[np.int64], Array]:
-    """Pixels of a cell that see its sphere, as flat indices (P,), and the normals there (P, 3).
+    """Return the pixels of a cell that see its sphere, flat indices (P,), and its normals (P, 3).
 
-    With the light along X all pixels of a column have the same N.L, and stand for all directions
-    from which that N.L is seen; so columns are many and rows are few.
+    With the light along X, all pixels of a column have the same N.L. Each stands for another
+    direction from which that N.L is seen, so columns are many and rows are few.
     """
     x = PITCH * ((np.arange(across) + 0.5) / across - 0.5)
     y = PITCH * ((np.arange(down) + 0.5) / down - 0.5)
@@ -75,7 +76,7 @@ def new_node_tree(owner: Any) -> Any:
 
 
 def make_material(order: dict[str, Any]) -> bpy.types.Material:
-    """Make the one material of all spheres; its scale is the alpha of the object's colour."""
+    """Make the material that all spheres share; its scale is the alpha of the object's colour."""
     material = bpy.data.materials.new("Sphere")
     tree = new_node_tree(material)
     scatter = tree.nodes.new("ShaderNodeSubsurfaceScattering")
@@ -96,12 +97,12 @@ def make_spheres(order: dict[str, Any], columns: int, rows: int) -> None:
     first.data.shade_smooth()
     first.data.materials.append(make_material(order))
     for number, scale in enumerate(order["scales"]):
-        item = first.copy() if number else first
+        obj = first.copy() if number else first
         if number:
-            bpy.context.scene.collection.objects.link(item)
+            bpy.context.scene.collection.objects.link(obj)
         row, column = divmod(number, columns)
-        item.location = (PITCH * (column - (columns - 1) / 2), PITCH * (row - (rows - 1) / 2), 0.0)
-        item.color = (1.0, 1.0, 1.0, scale)
+        obj.location = (PITCH * (column - (columns - 1) / 2), PITCH * (row - (rows - 1) / 2), 0.0)
+        obj.color = (1.0, 1.0, 1.0, scale)
 
 
 def make_scene(order: dict[str, Any]) -> bpy.types.Object:
@@ -122,7 +123,7 @@ def make_scene(order: dict[str, Any]) -> bpy.types.Object:
     scene.collection.objects.link(scene.camera)
     sun = bpy.data.lights.new("Sun", "SUN")
     sun.energy, sun.angle = math.pi, 0.0
-    # A convex body casts no shadow on itself that its normals do not know of.
+    # A convex body casts no shadow on itself: its terminator is where N.L is 0.
     sun.use_shadow = False
     lamp = bpy.data.objects.new("Sun", sun)
     lamp.rotation_mode = "QUATERNION"
@@ -132,7 +133,7 @@ def make_scene(order: dict[str, Any]) -> bpy.types.Object:
 
 
 def set_render(scene: bpy.types.Scene, order: dict[str, Any], columns: int, rows: int) -> None:
-    """Make a pixel the light through its centre and nothing else."""
+    """Make each pixel the radiance through its centre, unfiltered, linear and independent."""
     render, cycles = scene.render, scene.cycles
     render.engine = "CYCLES"
     across, down = order["pixels"]
@@ -151,18 +152,22 @@ def set_render(scene: bpy.types.Scene, order: dict[str, Any], columns: int, rows
     cycles.samples = order["samples"]
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False
-    # Neighbouring pixels must be independent, or their scatter says nothing of their mean.
+    # Neighbouring pixels must be independent: their scatter is the standard error of their mean.
     cycles.sampling_pattern = "TABULATED_SOBOL"
     cycles.pixel_filter_type = "BOX"
     cycles.filter_width = 0.01
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.light_sampling_threshold = 0.0
-    # No light from surface to surface: only the walk below the surface counts.
+    # No light from surface to surface: only the random walk below it counts.
     cycles.max_bounces = 0
 
 
 def read_pixels(path: Path) -> Array:
-    """Read a picture, (height, width, 3), row 0 at the bottom."""
+    """Read a picture, (height, width, 3), row 0 at the bottom.
+
+    Raises:
+        OSError: The file is not whole.
+    """
     image = bpy.data.images.load(str(path))
     width, height = image.size
     if not width * height:
@@ -174,15 +179,15 @@ def read_pixels(path: Path) -> Array:
 
 
 def cells(picture: Array, count: int, across: int, down: int) -> Array:
-    """Cut a picture into its spheres, (S, down * across, 3)."""
+    """Cut a picture into its first `count` spheres, (S, down * across, 3)."""
     rows, columns = picture.shape[0] // down, picture.shape[1] // across
     grid = picture.reshape(rows, down, columns, across, 3).swapaxes(1, 2)
     return grid.reshape(rows * columns, down * across, 3)[:count]
 
 
 def work(order: dict[str, Any]) -> None:
-    """Render all passes and write the sums."""
-    tell(0.0, "Preparing the spheres")
+    """Render all passes of an order and write the sums."""
+    report(0.0, "Preparing the spheres")
     lamp = make_scene(order)
     scene, (across, down), count = bpy.context.scene, order["pixels"], len(order["scales"])
     seen, normals = pixel_normals(across, down)
@@ -195,7 +200,7 @@ def work(order: dict[str, Any]) -> None:
     scene.render.filepath = str(frame)
     renders = len(elevations) * passes
     for number in range(renders):
-        tell(number / renders, f"Path tracing {count} spheres, pass {number + 1} of {renders}")
+        report(number / renders, f"Path tracing {count} spheres, pass {number + 1} of {renders}")
         view = number // passes
         direction = Vector(towards_light(elevations[view]))
         lamp.rotation_quaternion = direction.to_track_quat("Z", "Y")
@@ -211,22 +216,22 @@ def work(order: dict[str, Any]) -> None:
         square=np.concatenate(square, axis=1),
         blender=np.array(bpy.app.version_string),
     )
-    tell(1.0, "Path tracing done")
+    report(1.0, "Path tracing done")
 
 
 def end_with_parent() -> None:
-    """Wait for the end of the parent's pipe, which comes when the parent is gone."""
+    """Exit at the end of the parent's pipe, which comes when the parent ends, however it ends."""
     if sys.stdin is not None and not sys.stdin.isatty():
         sys.stdin.read()
         os._exit(1)
 
 
 def main() -> int:
-    """Do what the order says; 0 if it was done."""
+    """Carry out the order; return the exit code."""
     threading.Thread(target=end_with_parent, daemon=True).start()
     try:
         work(json.loads(Path(sys.argv[-1]).read_text(encoding="utf-8")))
-    except Exception:  # noqa: BLE001  (the parent gets the text, whatever it is)
+    except Exception:  # noqa: BLE001  (the parent reads the text, whatever it is)
         traceback.print_exc()
         return 1
     return 0

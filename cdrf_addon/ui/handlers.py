@@ -13,10 +13,10 @@ from ..blender.display import legend
 
 _HANDLERS = (
     ("depsgraph_update_post", state.note_touched),
-    ("load_post", state.forget_all),
-    ("load_post", state.forget_worlds),
-    ("undo_post", state.forget_all),
-    ("redo_post", state.forget_all),
+    ("load_post", state.clear_caches),
+    ("load_post", state.clear_world_cache),
+    ("undo_post", state.clear_caches),
+    ("redo_post", state.clear_caches),
 )
 
 

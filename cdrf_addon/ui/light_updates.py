@@ -12,12 +12,13 @@ from __future__ import annotations
 import bpy
 
 from .. import ids
-from ..blender import setup, state
+from ..blender import state
 from ..blender.lights.scene_lights import scene_lights
 from ..blender.material import linking
 from ..blender.material.install import cdrf_node
-from ..blender.material.lighting import lights_on_skin
-from ..blender.material.model import refresh_lights
+from ..blender.material.lighting import lights_of_translucent
+from ..blender.material.shader_group import refresh_lights
+from ..blender.material.translucent import translucent_materials_of
 from ..core.errors import CdrfError
 
 DELAY_SECONDS = 0.2
@@ -88,13 +89,13 @@ _HANDLERS = (
 def update_lights(context: bpy.types.Context) -> int:
     """Give the scene's lights to its translucent materials; return how many materials changed."""
     scene, layer = context.scene, context.view_layer
-    lights = lights_on_skin(scene, layer)
+    lights = lights_of_translucent(scene, layer)
     changed = 0
-    for material in setup.skins_of(layer):
+    for material in translucent_materials_of(layer):
         node = cdrf_node(material)
         if node is None or node.node_tree.get(ids.SCENE_KEY) != scene.name:
             continue
-        if state.lights_due(node.node_tree, linking.reaching(lights, material, layer)):
+        if state.lights_due(node.node_tree, linking.lights_reaching(lights, material, layer)):
             refresh_lights(material)
             changed += 1
     return changed

@@ -9,10 +9,11 @@ import bpy
 
 from .. import ids
 from ..blender import state
-from ..blender.display import curvature as display
-from ..blender.material import install as materials
-from ..blender.material import model as reflectance_models
-from ..blender.material import specular
+from ..blender.display.curvature import shows_curvature
+from ..blender.material.install import cdrf_node
+from ..blender.material.model import kind_of_model, profile_problem
+from ..blender.material.specular import find_principled
+from ..blender.material.translucent import active_translucent_material
 from ..blender.shader.variant import stamped_variant
 from ..blender.shader.wired import wired_lights
 from ..blender.world.stamps import stamped_world
@@ -39,7 +40,7 @@ def draw_surface(
     layout: bpy.types.UILayout, context: bpy.types.Context, material: bpy.types.Material
 ) -> None:
     """Draw how the light scatters, the colour and the shadows of a translucent material."""
-    node = materials.cdrf_node(material)
+    node = cdrf_node(material)
     assert node is not None
     column = layout.column()
     column.use_property_split = True
@@ -72,7 +73,7 @@ def draw_surface(
 
 def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None:
     """Draw the choice of model, and the buttons that find a scatter distance."""
-    kind = reflectance_models.kind_of_model(material)
+    kind = kind_of_model(material)
     name = next(label for key, label, *_ in MODEL_ITEMS if key == kind)
     row = layout.row(align=True)
     row.operator_menu_enum("cdrf.set_model", "model", text=name, icon="SHADING_TEXTURE")
@@ -85,14 +86,14 @@ def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None
         column = layout.column()
         column.prop(material.cdrf, "profile", text="")
         column.prop(material.cdrf, "profile_base", expand=False)
-        problem = reflectance_models.profile_problem(material)
+        problem = profile_problem(material)
         if problem:
             column.label(text=problem, icon="ERROR")
 
 
 def draw_ambient(layout: bpy.types.UILayout, material: bpy.types.Material) -> None:
     """Draw what is followed of the world's light, and the switch of its occlusion."""
-    node = materials.cdrf_node(material)
+    node = cdrf_node(material)
     assert node is not None
     light = stamped_world(node.node_tree)
     if light is None:
@@ -116,7 +117,7 @@ def draw_ambient(layout: bpy.types.UILayout, material: bpy.types.Material) -> No
 
 def draw_specular(layout: bpy.types.UILayout, material: bpy.types.Material) -> None:
     """Draw the switch of the specular part, where the material has one to keep."""
-    if specular.find_principled(material) is not None:
+    if find_principled(material) is not None:
         row = layout.row()
         row.enabled = material.is_editable
         row.prop(
@@ -129,7 +130,7 @@ def draw_display(
 ) -> None:
     """Draw the buttons that show the curvature in colours, and the one to remove translucency."""
     row = layout.row(align=True)
-    shown = display.shows_curvature(material)
+    shown = shows_curvature(material)
     button = row.operator(
         "cdrf.show_curvature",
         text="Show Skin" if shown else "Show Curvature",
@@ -198,7 +199,7 @@ class CDRF_PT_main(_View3D, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         obj = context.active_object
-        material = materials.active_skin(obj)
+        material = active_translucent_material(obj)
         row = layout.row()
         row.scale_y = 1.5
         row.operator("cdrf.setup", icon="SHADING_RENDERED")
@@ -237,7 +238,7 @@ class CDRF_PT_material(bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         material = context.object.active_material
-        if materials.cdrf_node(material) is None:
+        if cdrf_node(material) is None:
             button = layout.operator("cdrf.setup", icon="SHADING_RENDERED")
             button.only_active_slot = button.only_active_object = True
             return

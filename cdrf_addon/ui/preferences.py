@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty
 
+from .. import paths
 from . import light_updates
 
 
@@ -17,9 +18,9 @@ def _auto_update_changed(self: CdrfPreferences, _context: bpy.types.Context) -> 
 
 
 class CdrfPreferences(bpy.types.AddonPreferences):
-    """Preferences of the extension, whose package may lie inside another."""
+    """Preferences of the extension."""
 
-    bl_idname = (__package__ or "").removesuffix(".ui").removesuffix(".cdrf_addon")
+    bl_idname = paths.EXTENSION
 
     auto_update: BoolProperty(
         name="Update Lights Automatically",

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Properties on materials and meshes. What renders lives in node sockets; these show it."""
+"""Properties on materials and meshes.
+
+What renders is in the node of a material; `blender/material/settings.py` reads and writes it.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import math
 
 import bpy
 from bpy.props import (
@@ -17,12 +19,10 @@ from bpy.props import (
     StringProperty,
 )
 
-from .. import ids
-from ..blender.material import model as reflectance_models
-from ..blender.material import specular as gloss
-from ..blender.material.install import cdrf_node
+from ..blender.material import settings
+from ..blender.material.model import kind_of_model, set_kind
+from ..blender.material.shader_group import refresh_shadows
 from ..blender.material.shadow_choice import AUTO, SHADOW_ITEMS
-from ..blender.shader.variant import stamped_variant
 from ..core.curvature.creases import NO_CREASE
 from ..core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS
 from ..core.curvature.summary import CONSTANT, FLAT, VARYING
@@ -30,92 +30,59 @@ from ..core.errors import CdrfError
 from ..core.reflectance.model import MODEL_ITEMS, PROFILE, RING, SPHERE
 from ..core.reflectance.profile import SKIN_PROFILE
 
-UNSET = -1.0
-SIGMA0_MAX = 1e6
-RATIO_MAX = 1e3
-
-
-def _clean(value: float, high: float) -> float:
-    return min(max(value, 0.0), high) if math.isfinite(value) else (high if value > 0.0 else 0.0)
-
 
 def _get_sigma0(self: CdrfMaterial) -> float:
-    node = cdrf_node(self.id_data)
-    if node is not None:
-        return float(node.inputs[ids.SIGMA0].default_value)
-    return max(self.chosen_sigma0, 0.0)
+    return settings.sigma0(self.id_data)
 
 
 def _set_sigma0(self: CdrfMaterial, value: float) -> None:
-    self.chosen_sigma0 = _clean(value, SIGMA0_MAX)
-    node = cdrf_node(self.id_data)
-    if node is not None:
-        node.inputs[ids.SIGMA0].default_value = self.chosen_sigma0
+    settings.set_sigma0(self.id_data, value)
 
 
 def _get_ratio(self: CdrfMaterial) -> tuple[float, ...]:
-    node = cdrf_node(self.id_data)
-    source = node.inputs[ids.SIGMA0_RATIO].default_value if node else self.chosen_ratio
-    return tuple(source)
+    return settings.sigma0_ratio(self.id_data)
 
 
 def _set_ratio(self: CdrfMaterial, value: tuple[float, ...]) -> None:
-    ratio = tuple(_clean(factor, RATIO_MAX) for factor in value)
-    self.chosen_ratio = ratio
-    node = cdrf_node(self.id_data)
-    if node is None:
-        return
-    node.inputs[ids.SIGMA0_RATIO].default_value = ratio
-    # As many look-ups as there are different sigma0, no more.
-    reflectance_models.change_variant(self.id_data, ratio=ratio)
+    settings.set_sigma0_ratio(self.id_data, value)
 
 
 def _get_model(self: CdrfMaterial) -> int:
-    kinds = [item[0] for item in MODEL_ITEMS]
-    return kinds.index(reflectance_models.kind_of_model(self.id_data))
+    kinds = [kind for kind, *_ in MODEL_ITEMS]
+    return kinds.index(kind_of_model(self.id_data))
 
 
 def _set_model(self: CdrfMaterial, value: int) -> None:
     # A setter cannot report: what it cannot do it leaves. The operator cdrf.set_model says why.
     with contextlib.suppress(CdrfError):
-        reflectance_models.set_kind(self.id_data, MODEL_ITEMS[value][0])
+        set_kind(self.id_data, MODEL_ITEMS[value][0])
 
 
 def _profile_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
-    if reflectance_models.kind_of_model(self.id_data) == PROFILE:
+    if kind_of_model(self.id_data) == PROFILE:
         with contextlib.suppress(CdrfError):
-            reflectance_models.set_kind(self.id_data, PROFILE)
+            set_kind(self.id_data, PROFILE)
 
 
 def _get_occlusion(self: CdrfMaterial) -> bool:
-    node = cdrf_node(self.id_data)
-    return stamped_variant(node.node_tree).occluded if node else self.chosen_occlusion
+    return settings.is_occluded(self.id_data)
 
 
 def _set_occlusion(self: CdrfMaterial, value: bool) -> None:
-    self.chosen_occlusion = value
     with contextlib.suppress(CdrfError):
-        reflectance_models.change_variant(self.id_data, occluded=value)
+        settings.set_occluded(self.id_data, value)
 
 
-def _get_gloss(self: CdrfMaterial) -> bool:
-    if cdrf_node(self.id_data) is None:
-        return self.wants_gloss()
-    return gloss.has_gloss(self.id_data)
+def _get_specular(self: CdrfMaterial) -> bool:
+    return settings.is_specular(self.id_data)
 
 
-def _set_gloss(self: CdrfMaterial, value: bool) -> None:
-    self.chosen_gloss = int(value)
-    if cdrf_node(self.id_data) is None or not self.id_data.is_editable:
-        return
-    if value:
-        gloss.add_gloss(self.id_data)
-    else:
-        gloss.remove_gloss(self.id_data)
+def _set_specular(self: CdrfMaterial, value: bool) -> None:
+    settings.set_specular(self.id_data, value)
 
 
 def _shadows_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
-    reflectance_models.refresh_shadows(self.id_data)
+    refresh_shadows(self.id_data)
 
 
 class CdrfMaterial(bpy.types.PropertyGroup):
@@ -129,7 +96,7 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         ),
         subtype="DISTANCE",
         min=0.0,
-        max=SIGMA0_MAX,
+        max=settings.SIGMA0_MAX,
         soft_max=1.0,
         step=0.1,
         precision=4,
@@ -146,7 +113,7 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         size=3,
         default=(1.0, 1.0, 1.0),
         min=0.0,
-        max=RATIO_MAX,
+        max=settings.RATIO_MAX,
         soft_max=1.0,
         step=1,
         precision=3,
@@ -156,7 +123,7 @@ class CdrfMaterial(bpy.types.PropertyGroup):
     )
     model: EnumProperty(
         name="Model",
-        description="How the light that spreads under the surface shades it",
+        description="How light that spreads under the surface shades it",
         items=MODEL_ITEMS,
         get=_get_model,
         set=_set_model,
@@ -165,8 +132,8 @@ class CdrfMaterial(bpy.types.PropertyGroup):
     profile: StringProperty(
         name="Profile",
         description=(
-            "Gaussians of the diffusion profile, parted by semicolons. Each is four numbers: its "
-            "width in any unit, then its part of red, green and blue"
+            "Gaussians of the diffusion profile, separated by semicolons. Each is four numbers: "
+            "its width in any unit, then its part of red, green and blue"
         ),
         default=SKIN_PROFILE.to_text(),
         update=_profile_changed,
@@ -189,27 +156,20 @@ class CdrfMaterial(bpy.types.PropertyGroup):
             "Keep the specular half of the material's Principled BSDF (roughness, coat, sheen, "
             "emission) on top of the translucent surface"
         ),
-        get=_get_gloss,
-        set=_set_gloss,
+        get=_get_specular,
+        set=_set_specular,
         options=set(),
     )
-    chosen_gloss: IntProperty(default=-1, options={"HIDDEN"})
     ambient_occlusion: BoolProperty(
         name="Ambient Occlusion",
         description=(
-            "What is near takes away from the world's light: darker nostrils, ears and collars. "
-            "Found in what is on screen, so it costs time per pixel. Lights are not affected"
+            "Nearby surfaces block the world's light: darker nostrils, ears and collars. Only "
+            "what is on screen counts, and it costs time per pixel. Lights are not affected"
         ),
         get=_get_occlusion,
         set=_set_occlusion,
         options=set(),
     )
-    chosen_occlusion: BoolProperty(default=False, options={"HIDDEN"})
-
-    def wants_gloss(self) -> bool:
-        """What was chosen; without a choice, whether the material has gloss to keep."""
-        return gloss.suits(self.id_data) if self.chosen_gloss < 0 else bool(self.chosen_gloss)
-
     shadows: EnumProperty(
         name="Shadows",
         description=(
@@ -231,12 +191,15 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         update=_shadows_changed,
         options=set(),
     )
+    # What was chosen, for as long as the material is not translucent.
     chosen_model: StringProperty(options={"HIDDEN"})
-    measured: StringProperty(options={"HIDDEN"})
-    # Blender deletes pictures that nobody uses; this one is wanted again.
-    measured_image: PointerProperty(type=bpy.types.Image, options={"HIDDEN"})
-    chosen_sigma0: FloatProperty(default=UNSET, options={"HIDDEN"})
+    chosen_sigma0: FloatProperty(default=settings.UNSET, options={"HIDDEN"})
     chosen_ratio: FloatVectorProperty(size=3, default=(1.0, 1.0, 1.0), options={"HIDDEN"})
+    chosen_gloss: IntProperty(default=-1, options={"HIDDEN"})
+    chosen_occlusion: BoolProperty(default=False, options={"HIDDEN"})
+    measured: StringProperty(options={"HIDDEN"})
+    # Blender deletes pictures that nobody uses; this one is needed again.
+    measured_image: PointerProperty(type=bpy.types.Image, options={"HIDDEN"})
 
 
 class CdrfMesh(bpy.types.PropertyGroup):
@@ -272,7 +235,7 @@ CLASSES = (CdrfMaterial, CdrfMesh)
 
 
 def register() -> None:
-    """Register the property groups and hang them on Material and Mesh."""
+    """Register the property groups and attach them to Material and Mesh."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Material.cdrf = PointerProperty(type=CdrfMaterial)

@@ -34,7 +34,9 @@ from cdrf_addon.core.measured.fitting import MODELS, ModelFitter  # noqa: E402
 from cdrf_addon.core.measured.material_fit import fit_material  # noqa: E402
 from cdrf_addon.core.measured.measurement import SphereMeasurement, equator_weights  # noqa: E402
 from cdrf_addon.core.measured.model import MeasuredModel  # noqa: E402
-from cdrf_addon.measuring.process import QUALITIES, Request, cached, measure  # noqa: E402
+from cdrf_addon.measuring.cache import cached  # noqa: E402
+from cdrf_addon.measuring.process import measure  # noqa: E402
+from cdrf_addon.measuring.request import QUALITIES, Request  # noqa: E402
 
 Array = NDArray[np.float64]
 Albedo = tuple[float, float, float]

@@ -45,7 +45,8 @@ from cdrf_addon.core.measured.model import measured_model  # noqa: E402
 from cdrf_addon.core.progress import run_steps  # noqa: E402
 from cdrf_addon.core.reflectance.model import Model, ring, sphere  # noqa: E402
 from cdrf_addon.core.scattering.node_radius import sigma0_per_radius  # noqa: E402
-from cdrf_addon.measuring.process import Request, measure  # noqa: E402
+from cdrf_addon.measuring.process import measure  # noqa: E402
+from cdrf_addon.measuring.request import Request  # noqa: E402
 
 SHAPES = {
     "head": ROOT / "tests" / "data" / "human_head.obj",

@@ -24,7 +24,7 @@ from numpy.typing import NDArray  # noqa: E402
 from rig import Rig, cdrf_node  # noqa: E402
 
 from cdrf_addon import ids, register, unregister  # noqa: E402
-from cdrf_addon.blender import stage  # noqa: E402
+from cdrf_addon.command import stage  # noqa: E402
 from cdrf_addon.core.curvature.scale_space import LEVELS  # noqa: E402
 
 HEAD = ROOT / "tests" / "data" / "human_head.obj"

@@ -36,7 +36,7 @@ SAMPLES = 24
 CYCLES_SAMPLES = 128
 CASES = ("sphere 1", "head 1", "head 2")
 PORTRAIT = ("head 1", 0.1)
-"""The case whose pictures docs/guide/artist.md shows by themselves."""
+"""The case whose pictures docs/guide/shadows.md shows by themselves."""
 ALBEDO = 0.9
 RADII = (1.0, 0.35, 0.2)
 SCALES = (0.03, 0.1)

@@ -31,31 +31,31 @@ def stored(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
 @pytest.mark.smoke
 @pytest.mark.parametrize("method", list(METHODS))
 def test_every_method_from_the_operator(rig: Rig, method: str) -> None:
-    item = ring()
+    obj = ring()
     assert bpy.ops.cdrf.setup(method=method) == {"FINISHED"}
-    k1 = stored(item.data, ids.CURVATURE_ATTRIBUTE)[:, 1]
+    k1 = stored(obj.data, ids.CURVATURE_ATTRIBUTE)[:, 1]
     assert np.abs(k1 - 2.5).max() <= 0.1
-    assert item.data.cdrf.method == method
+    assert obj.data.cdrf.method == method
     # Update keeps the method; nothing has changed, so nothing is measured again.
-    item.data.attributes[ids.CURVATURE_ATTRIBUTE].data[0].color = (9.0, 9.0, 9.0, 9.0)
+    obj.data.attributes[ids.CURVATURE_ATTRIBUTE].data[0].color = (9.0, 9.0, 9.0, 9.0)
     bpy.ops.cdrf.update()
-    assert item.data.attributes[ids.CURVATURE_ATTRIBUTE].data[0].color[0] == 9.0
-    item.data.vertices[5].co *= 1.01
-    item.data.update()
+    assert obj.data.attributes[ids.CURVATURE_ATTRIBUTE].data[0].color[0] == 9.0
+    obj.data.vertices[5].co *= 1.01
+    obj.data.update()
     bpy.ops.cdrf.update()
-    assert item.data.cdrf.method == method
-    assert item.data.attributes[ids.CURVATURE_ATTRIBUTE].data[0].color[0] < 9.0
+    assert obj.data.cdrf.method == method
+    assert obj.data.attributes[ids.CURVATURE_ATTRIBUTE].data[0].color[0] < 9.0
 
 
 @pytest.mark.smoke
 def test_levels_are_stored_in_world_units(rig: Rig) -> None:
-    item = ring()
+    obj = ring()
     bpy.ops.cdrf.setup()
     area = 4.0 * math.pi**2 * 0.4
-    length = item.data.attributes[ids.LENGTH_ATTRIBUTE].data[7].value
+    length = obj.data.attributes[ids.LENGTH_ATTRIBUTE].data[7].value
     assert length == pytest.approx(math.sqrt(area) / 256.0, rel=0.01)
-    levels = stored(item.data, ids.DIFFUSED_ATTRIBUTE)
-    kappa = stored(item.data, ids.CURVATURE_ATTRIBUTE)[:, 0]
+    levels = stored(obj.data, ids.DIFFUSED_ATTRIBUTE)
+    kappa = stored(obj.data, ids.CURVATURE_ATTRIBUTE)[:, 0]
     assert np.abs(levels[:, 0] - kappa).max() <= 0.02 * kappa.max()
     assert (np.diff(levels.std(axis=0)) < 0.0).all()
     assert levels.mean(axis=0) == pytest.approx(np.full(4, kappa.mean()), rel=0.05)
@@ -69,20 +69,20 @@ def test_flat_faces_have_no_curvature(rig: Rig, kind: str) -> None:
         bpy.ops.mesh.primitive_cube_add()
     else:
         bpy.ops.mesh.primitive_cylinder_add(vertices=5)
-    item = bpy.context.object
+    obj = bpy.context.object
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    assert item.data.cdrf.kind == FLAT
-    assert ids.CURVATURE_ATTRIBUTE not in item.data.attributes
-    assert ids.DIFFUSED_ATTRIBUTE not in item.data.attributes
+    assert obj.data.cdrf.kind == FLAT
+    assert ids.CURVATURE_ATTRIBUTE not in obj.data.attributes
+    assert ids.DIFFUSED_ATTRIBUTE not in obj.data.attributes
 
 
 def test_a_rounded_cube_bends(rig: Rig) -> None:
     bpy.ops.mesh.primitive_cube_add()
-    item = bpy.context.object
-    item.modifiers.new("Bevel", "BEVEL").segments = 4
+    obj = bpy.context.object
+    obj.modifiers.new("Bevel", "BEVEL").segments = 4
     bpy.ops.object.modifier_apply(modifier="Bevel")
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    assert item.data.cdrf.kind == VARYING
+    assert obj.data.cdrf.kind == VARYING
 
 
 def drum() -> bpy.types.Object:
@@ -97,19 +97,19 @@ def drum() -> bpy.types.Object:
     ]
     mesh = bpy.data.meshes.new("Drum")
     mesh.from_pydata(vertices, [], faces)
-    item = bpy.data.objects.new("Drum", mesh)
-    bpy.context.scene.collection.objects.link(item)
-    item.select_set(True)
-    return item
+    obj = bpy.data.objects.new("Drum", mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    obj.select_set(True)
+    return obj
 
 
 @pytest.mark.smoke
 def test_split_creases_from_the_operator(rig: Rig) -> None:
-    item = drum()
+    obj = drum()
     bpy.ops.cdrf.setup(crease_angle=math.radians(40.0))
-    split = stored(item.data, ids.CURVATURE_ATTRIBUTE)[:, 0]
+    split = stored(obj.data, ids.CURVATURE_ATTRIBUTE)[:, 0]
     bpy.ops.cdrf.setup()
-    whole = stored(item.data, ids.CURVATURE_ATTRIBUTE)[:, 0]
+    whole = stored(obj.data, ids.CURVATURE_ATTRIBUTE)[:, 0]
     # The ring is flat, the cylinder has kappa 1 / sqrt(2), the rim the mean of both.
     assert np.abs(split[: 64 * 8]).max() <= 1e-3
     assert np.abs(split[64 * 9 :] - math.sqrt(0.5)).max() <= 0.01
@@ -120,35 +120,35 @@ def test_split_creases_from_the_operator(rig: Rig) -> None:
 @pytest.mark.smoke
 def test_a_mirrored_instance_is_measured_once(rig: Rig) -> None:
     rig.light("SUN")
-    item = ring()
-    other = item.copy()
+    obj = ring()
+    other = obj.copy()
     other.scale = (-1.0, 1.0, 1.0)
     other.location.x = 5.0
     rig.scene.collection.objects.link(other)
     other.select_set(True)
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    assert item.data is other.data
-    assert "scaled" not in cdrf_node(item).node_tree.name
+    assert obj.data is other.data
+    assert "scaled" not in cdrf_node(obj).node_tree.name
     assert ids.SCALE_KEY not in other
 
 
 def test_objects_nobody_sees_are_not_measured(rig: Rig) -> None:
     rig.light("SUN")
-    item, other = ring(), ring()
-    item.select_set(True)
+    obj, other = ring(), ring()
+    obj.select_set(True)
     bpy.ops.cdrf.setup()
-    for one in (item, other):
+    for one in (obj, other):
         one.data.vertices[0].co *= 1.1
         one.data.update()
     before = other.data.cdrf.fingerprint
     other.hide_render = True
     other.hide_set(True)
-    changed = item.data.cdrf.fingerprint
+    changed = obj.data.cdrf.fingerprint
     bpy.ops.cdrf.update()
     assert other.data.cdrf.fingerprint == before
-    assert item.data.cdrf.fingerprint != changed
-    item.hide_render = True
-    item.hide_set(True)
+    assert obj.data.cdrf.fingerprint != changed
+    obj.hide_render = True
+    obj.hide_set(True)
     with pytest.raises(RuntimeError, match="hidden: show one"):
         bpy.ops.cdrf.update()
 
@@ -165,13 +165,13 @@ def test_a_finer_mesh_of_the_same_shape_shades_alike(rig: Rig) -> None:
             minor_segments=segments // 2,
         )
         bpy.ops.object.shade_smooth()
-        item = bpy.context.object
+        obj = bpy.context.object
         bpy.ops.cdrf.setup()
-        cdrf_node(item).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
+        cdrf_node(obj).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
         for sigma0 in (0.0, 0.15):
-            item.data.materials[0].cdrf.sigma0 = sigma0
+            obj.data.materials[0].cdrf.sigma0 = sigma0
             images[segments, sigma0] = rig.render()
-        bpy.data.objects.remove(item)
+        bpy.data.objects.remove(obj)
     covered = np.minimum(images[48, 0.0][..., 3], images[192, 0.0][..., 3]) > 0.999
     added = [
         (images[segments, 0.15] - images[segments, 0.0])[covered][:, 0] for segments in (48, 192)
@@ -183,11 +183,11 @@ def test_a_finer_mesh_of_the_same_shape_shades_alike(rig: Rig) -> None:
 @pytest.mark.smoke
 @pytest.mark.parametrize("kind", ["TRIANGULATE", "MIRROR", "SOLIDIFY", "ARRAY", "EDGE_SPLIT"])
 def test_lengths_reach_the_shader_through_modifiers(rig: Rig, kind: str) -> None:
-    item = ring()
-    item.modifiers.new("Modifier", kind)
+    obj = ring()
+    obj.modifiers.new("Modifier", kind)
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    stored_length = item.data.attributes[ids.LENGTH_ATTRIBUTE].data[0].value
-    evaluated = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    stored_length = obj.data.attributes[ids.LENGTH_ATTRIBUTE].data[0].value
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = evaluated.to_mesh()
     values = np.empty(len(mesh.vertices), dtype=np.float32)
     mesh.attributes[ids.LENGTH_ATTRIBUTE].data.foreach_get("value", values)

@@ -11,6 +11,7 @@ import pytest
 from rig import Rig
 
 from cdrf_addon import ids
+from cdrf_addon.blender.pictures import read_picture
 from cdrf_addon.core.colour_scale import HOT, MARK_COLOUR, SIGNED, colours, srgb, ticks
 
 # Blender keeps a colour ramp as a table of 257 texels.
@@ -18,11 +19,11 @@ RAMP = 5e-3
 
 
 def egg(rig: Rig) -> bpy.types.Object:
-    item = rig.sphere()
-    item.scale = (1.0, 1.0, 1.4)
+    obj = rig.sphere()
+    obj.scale = (1.0, 1.0, 1.4)
     bpy.ops.object.transform_apply(scale=True)
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    return item
+    return obj
 
 
 @pytest.mark.smoke
@@ -44,12 +45,10 @@ def test_colours_and_marks() -> None:
 
 
 def test_pixels_have_the_colours_of_the_legend(rig: Rig) -> None:
-    item = egg(rig)
-    values = np.tile(
-        np.array((2.0, 2.0, -1.0, 0.5), dtype=np.float32), (len(item.data.vertices), 1)
-    )
-    item.data.attributes[ids.CURVATURE_ATTRIBUTE].data.foreach_set("color", values.ravel())
-    known = item.data.cdrf
+    obj = egg(rig)
+    values = np.tile(np.array((2.0, 2.0, -1.0, 0.5), dtype=np.float32), (len(obj.data.vertices), 1))
+    obj.data.attributes[ids.CURVATURE_ATTRIBUTE].data.foreach_set("color", values.ravel())
+    known = obj.data.cdrf
     known.low, known.high, known.mean_high = 1.0, 4.0, 1.0
     for quantity, part, scale in (("KAPPA", 1 / 3, HOT), ("MEAN", 0.75, SIGNED)):
         bpy.ops.cdrf.show_curvature(display="ON", quantity=quantity)
@@ -62,9 +61,9 @@ def test_pixels_have_the_colours_of_the_legend(rig: Rig) -> None:
 
 @pytest.mark.smoke
 def test_filled_vertices_are_green(rig: Rig) -> None:
-    item = egg(rig)
-    marks = item.data.attributes.new(ids.FILLED_ATTRIBUTE, "FLOAT", "POINT")
-    marks.data.foreach_set("value", np.ones(len(item.data.vertices), dtype=np.float32))
+    obj = egg(rig)
+    marks = obj.data.attributes.new(ids.FILLED_ATTRIBUTE, "FLOAT", "POINT")
+    marks.data.foreach_set("value", np.ones(len(obj.data.vertices), dtype=np.float32))
     bpy.ops.cdrf.show_curvature(display="ON")
     pixels = rig.render()
     covered = pixels[..., 3] > 0.999
@@ -76,23 +75,23 @@ def test_a_mesh_with_a_hub_has_its_tip_marked(rig: Rig) -> None:
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.subdivide(number_cuts=3)
     bpy.ops.object.mode_set(mode="OBJECT")
-    item = bpy.context.object
+    obj = bpy.context.object
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    marks = np.empty(len(item.data.vertices), dtype=np.float32)
-    item.data.attributes[ids.FILLED_ATTRIBUTE].data.foreach_get("value", marks)
+    marks = np.empty(len(obj.data.vertices), dtype=np.float32)
+    obj.data.attributes[ids.FILLED_ATTRIBUTE].data.foreach_get("value", marks)
     assert 0 < marks.sum() < len(marks) / 10
-    assert "join too many edges" in item.data.cdrf.warnings
+    assert "join too many edges" in obj.data.cdrf.warnings
     bpy.ops.cdrf.remove()
-    assert ids.FILLED_ATTRIBUTE not in item.data.attributes
+    assert ids.FILLED_ATTRIBUTE not in obj.data.attributes
 
 
 @pytest.mark.smoke
 def test_the_view_comes_back(rig: Rig) -> None:
-    item = egg(rig)
+    obj = egg(rig)
     view = rig.scene.view_settings
     view.view_transform, view.exposure = "AgX", 1.5
     look = view.look
-    nodes = {node.name for node in item.data.materials[0].node_tree.nodes}
+    nodes = {node.name for node in obj.data.materials[0].node_tree.nodes}
     for quantity in ("KAPPA", "DIFFUSED", "MEAN"):
         bpy.ops.cdrf.show_curvature(display="ON", quantity=quantity)
         assert view.view_transform == "Standard"
@@ -100,10 +99,10 @@ def test_the_view_comes_back(rig: Rig) -> None:
     bpy.ops.cdrf.show_curvature(display="OFF")
     assert (view.view_transform, view.look, view.exposure) == ("AgX", look, 1.5)
     assert ids.DISPLAY_KEY not in rig.scene
-    assert {node.name for node in item.data.materials[0].node_tree.nodes} == nodes
+    assert {node.name for node in obj.data.materials[0].node_tree.nodes} == nodes
 
 
-def test_removing_the_last_skin_brings_the_view_back(rig: Rig) -> None:
+def test_removing_the_last_translucent_material_brings_the_view_back(rig: Rig) -> None:
     egg(rig)
     rig.scene.view_settings.view_transform = "AgX"
     bpy.ops.cdrf.show_curvature(display="ON")
@@ -113,13 +112,13 @@ def test_removing_the_last_skin_brings_the_view_back(rig: Rig) -> None:
 
 
 def test_the_curvature_as_rendered(rig: Rig) -> None:
-    item = egg(rig)
-    mesh = item.data
+    obj = egg(rig)
+    mesh = obj.data
     levels = np.tile(np.array((4.0, 3.0, 2.0, 1.0), dtype=np.float32), (len(mesh.vertices), 1))
     mesh.attributes[ids.DIFFUSED_ATTRIBUTE].data.foreach_set("color", levels.ravel())
     mesh.cdrf.low, mesh.cdrf.high = 1.0, 4.0
     for sigma0, part in ((0.0, 1.0), (1e4, 0.0)):
-        item.data.materials[0].cdrf.sigma0 = sigma0
+        obj.data.materials[0].cdrf.sigma0 = sigma0
         bpy.ops.cdrf.show_curvature(display="ON", quantity="DIFFUSED")
         pixels = rig.render()
         covered = pixels[..., 3] > 0.999
@@ -134,10 +133,8 @@ def test_a_saved_picture_has_a_legend_and_changes_nothing(rig: Rig, tmp_path: Pa
     before = rig.scene.render.image_settings.file_format, rig.scene.view_settings.view_transform
     path = tmp_path / "curvature.png"
     assert bpy.ops.cdrf.save_curvature(filepath=str(path)) == {"FINISHED"}
-    image = bpy.data.images.load(str(path))
-    flat = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(flat)
-    pixels = flat.reshape(240, 320, 4)
+    pixels = read_picture(path)
+    assert pixels.shape == (240, 320, 4)
     legend = pixels[:200, 10:18, :3].reshape(-1, 3)
     # Black, red, yellow and white of the bar, and white letters beside it.
     for colour in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)):
@@ -177,10 +174,10 @@ def test_video_and_stereo_settings_survive_a_saved_picture(rig: Rig, tmp_path: P
 
 @pytest.mark.smoke
 def test_the_display_can_be_switched_off_whatever_became_of_the_objects(rig: Rig) -> None:
-    item = egg(rig)
+    obj = egg(rig)
     rig.scene.view_settings.view_transform = "AgX"
     bpy.ops.cdrf.show_curvature(display="ON")
-    bpy.data.objects.remove(item)
+    bpy.data.objects.remove(obj)
     assert bpy.ops.cdrf.show_curvature() == {"FINISHED"}
     assert rig.scene.view_settings.view_transform == "AgX"
     assert ids.DISPLAY_KEY not in rig.scene
@@ -197,8 +194,8 @@ def test_a_view_chosen_meanwhile_stays(rig: Rig) -> None:
 
 
 def test_nothing_is_shown_without_an_output(rig: Rig) -> None:
-    item = egg(rig)
-    tree = item.data.materials[0].node_tree
+    obj = egg(rig)
+    tree = obj.data.materials[0].node_tree
     tree.nodes.remove(tree.nodes[ids.OUTPUT_NODE])
     with pytest.raises(RuntimeError, match="press Update first"):
         bpy.ops.cdrf.show_curvature(display="ON")

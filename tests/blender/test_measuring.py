@@ -12,14 +12,15 @@ import pytest
 from rig import Rig, cdrf_node
 
 from cdrf_addon import ids
-from cdrf_addon.blender.material import model as reflectance_models
+from cdrf_addon.blender.material.model import ensure_chosen, profile_problem
+from cdrf_addon.blender.material.scatter_distance import channel_sigma0, overridden
 from cdrf_addon.blender.nodes.tables import ensure_table, find_table
 from cdrf_addon.compat import ensure_node_tree
 from cdrf_addon.core.measured.measurement import SphereMeasurement
 from cdrf_addon.core.measured.model import measured_model
 from cdrf_addon.core.reflectance.model import MEASURED, RING, SPHERE
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
-from cdrf_addon.measuring.process import Request
+from cdrf_addon.measuring.request import Request
 from cdrf_addon.ui.operators import measure as ops_measure
 
 COSINE = np.linspace(-0.96, 0.96, 64)
@@ -43,7 +44,7 @@ def spheres(request: Request) -> SphereMeasurement:
 
 
 @pytest.fixture
-def skin(rig: Rig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> bpy.types.Material:
+def material(rig: Rig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> bpy.types.Material:
     """A translucent material on a torus, and a path tracer that answers at once."""
 
     def steps(request: Request, _folder: Path) -> Iterator[tuple[float, str]]:
@@ -56,7 +57,7 @@ def skin(rig: Rig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> bpy.types
     monkeypatch.setattr(ops_measure, "cache_folder", lambda: tmp_path)
     rig.light("SUN", angle=0.0)
     bpy.ops.mesh.primitive_torus_add(major_segments=32, minor_segments=16)
-    item = bpy.context.object
+    obj = bpy.context.object
     material = bpy.data.materials.new("Skin")
     tree = ensure_node_tree(material)
     tree.nodes.clear()
@@ -67,16 +68,16 @@ def skin(rig: Rig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> bpy.types
     node.inputs["Scale"].default_value = 1.0
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(node.outputs[0], output.inputs["Surface"])
-    item.data.materials.append(material)
+    obj.data.materials.append(material)
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
     return material
 
 
 def own_sigma0(material: bpy.types.Material) -> np.ndarray:
-    return np.array(reflectance_models.channel_sigma0(material))
+    return np.array(channel_sigma0(material))
 
 
-def test_a_script_gets_the_materials_own_scattering(skin: bpy.types.Material) -> None:
+def test_a_script_gets_the_materials_own_scattering(material: bpy.types.Material) -> None:
     assert bpy.ops.cdrf.measure() == {"FINISHED"}
     assert asked[0].albedo == pytest.approx((0.3, 0.5, 0.9))
     assert asked[0].method == "RANDOM_WALK"
@@ -86,36 +87,36 @@ def test_a_script_gets_the_materials_own_scattering(skin: bpy.types.Material) ->
     assert not asked[1].all_views
 
 
-def test_measured_means_the_sigma0_of_the_widest_channel(skin: bpy.types.Material) -> None:
+def test_measured_means_the_sigma0_of_the_widest_channel(material: bpy.types.Material) -> None:
     assert bpy.ops.cdrf.measure(energy="MEASURED") == {"FINISHED"}
-    assert skin.cdrf.model == MEASURED
-    assert skin.cdrf.sigma0 == pytest.approx(WIDTHS.max(), rel=FITTED)
-    table = find_table(skin.cdrf.measured)
+    assert material.cdrf.model == MEASURED
+    assert material.cdrf.sigma0 == pytest.approx(WIDTHS.max(), rel=FITTED)
+    table = find_table(material.cdrf.measured)
     assert table is not None and max(table.moments) == pytest.approx(1.0)
-    assert own_sigma0(skin) == pytest.approx(WIDTHS, rel=FITTED)
+    assert own_sigma0(material) == pytest.approx(WIDTHS, rel=FITTED)
 
 
-def test_changing_the_model_again_and_again_leaves_the_slider(skin: bpy.types.Material) -> None:
+def test_changing_the_model_again_and_again_leaves_the_slider(material: bpy.types.Material) -> None:
     bpy.ops.cdrf.measure(energy="MEASURED")
-    first = skin.cdrf.sigma0, own_sigma0(skin)
+    first = material.cdrf.sigma0, own_sigma0(material)
     for kind in (SPHERE, MEASURED, RING, MEASURED) * 2:
         assert bpy.ops.cdrf.set_model(model=kind) == {"FINISHED"}
-        assert skin.cdrf.sigma0 == pytest.approx(first[0], rel=1e-5)
-        assert own_sigma0(skin) == pytest.approx(first[1], rel=1e-5)
+        assert material.cdrf.sigma0 == pytest.approx(first[0], rel=1e-5)
+        assert own_sigma0(material) == pytest.approx(first[1], rel=1e-5)
 
 
-def test_the_fit_is_right_at_the_middle_curvature(skin: bpy.types.Material) -> None:
+def test_the_fit_is_right_at_the_middle_curvature(material: bpy.types.Material) -> None:
     assert bpy.ops.cdrf.fit() == {"FINISHED"}
     kappa = bpy.context.object.data.cdrf.median
     expected = 0.6 * np.tanh(WIDTHS * kappa / 0.6) / kappa
-    assert own_sigma0(skin) == pytest.approx(expected, rel=FITTED)
-    assert skin.cdrf.model == SPHERE
+    assert own_sigma0(material) == pytest.approx(expected, rel=FITTED)
+    assert material.cdrf.model == SPHERE
     picture = bpy.data.images[ids.FIT_IMAGE]
     assert picture.packed_file is not None and min(picture.size) > 500
 
 
 def test_the_measured_table_stays_in_the_file_while_another_model_is_used(
-    skin: bpy.types.Material, tmp_path: Path
+    material: bpy.types.Material, tmp_path: Path
 ) -> None:
     bpy.ops.cdrf.measure(energy="MEASURED")
     bpy.ops.cdrf.set_model(model=SPHERE)
@@ -126,59 +127,61 @@ def test_the_measured_table_stays_in_the_file_while_another_model_is_used(
     assert bpy.ops.cdrf.set_model(model=MEASURED) == {"FINISHED"}
 
 
-def test_a_deleted_measured_table_is_said(skin: bpy.types.Material) -> None:
+def test_a_deleted_measured_table_is_said(material: bpy.types.Material) -> None:
     bpy.ops.cdrf.measure()
-    table = find_table(skin.cdrf.measured)
+    table = find_table(material.cdrf.measured)
     assert table is not None
     bpy.data.images.remove(table.image)
-    key, sentence = reflectance_models.ensure_chosen(skin)
+    key, sentence = ensure_chosen(material)
     assert key == SPHERE and "Measure again" in sentence
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    assert skin.cdrf.model == SPHERE
+    assert material.cdrf.model == SPHERE
 
 
-def test_a_deleted_profile_with_unreadable_text_is_a_way_out_too(skin: bpy.types.Material) -> None:
-    skin.cdrf.model = "PROFILE"
-    skin.cdrf.profile = "garbage"
+def test_a_deleted_profile_with_unreadable_text_is_a_way_out_too(
+    material: bpy.types.Material,
+) -> None:
+    material.cdrf.model = "PROFILE"
+    material.cdrf.profile = "garbage"
     node = cdrf_node(bpy.context.object)
     table = find_table(node.node_tree[ids.MODEL_KEY])
     assert table is not None
     bpy.data.images.remove(table.image)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    assert skin.cdrf.model == SPHERE
+    assert material.cdrf.model == SPHERE
     assert bpy.ops.cdrf.preset(preset="SKIN_LAYERED") == {"FINISHED"}
-    assert skin.cdrf.model == "PROFILE"
-    assert reflectance_models.profile_problem(skin) == ""
+    assert material.cdrf.model == "PROFILE"
+    assert profile_problem(material) == ""
 
 
-def test_what_moves_sigma0_is_named(skin: bpy.types.Material) -> None:
-    assert reflectance_models.overridden(skin) == ""
+def test_what_moves_sigma0_is_named(material: bpy.types.Material) -> None:
+    assert overridden(material) == ""
     socket = cdrf_node(bpy.context.object).inputs[ids.SIGMA0]
     socket.default_value = 0.1
     socket.keyframe_insert("default_value", frame=1)
-    assert "animated" in reflectance_models.overridden(skin)
-    value = skin.node_tree.nodes.new("ShaderNodeValue")
-    skin.node_tree.links.new(value.outputs[0], socket)
-    assert "connected" in reflectance_models.overridden(skin)
+    assert "animated" in overridden(material)
+    value = material.node_tree.nodes.new("ShaderNodeValue")
+    material.node_tree.links.new(value.outputs[0], socket)
+    assert "connected" in overridden(material)
 
 
-def test_presets_leave_the_papers_model(skin: bpy.types.Material) -> None:
+def test_presets_leave_the_papers_model(material: bpy.types.Material) -> None:
     bpy.ops.cdrf.set_model(model=RING)
     bpy.ops.cdrf.preset(preset="MARBLE")
-    assert skin.cdrf.model == RING
+    assert material.cdrf.model == RING
 
 
-def test_tables_that_nobody_uses_are_removed(skin: bpy.types.Material) -> None:
-    skin.cdrf.model = "PROFILE"
+def test_tables_that_nobody_uses_are_removed(material: bpy.types.Material) -> None:
+    material.cdrf.model = "PROFILE"
     for width in range(2, 6):
-        skin.cdrf.profile = f"1 0.5 1 1; {width} 0.5 0 0"
+        material.cdrf.profile = f"1 0.5 1 1; {width} 0.5 0 0"
     tables = [image for image in bpy.data.images if image.get(ids.ROLE_KEY) == ids.ROLE_LUT]
     assert len(tables) == 1
 
 
 @pytest.mark.parametrize("radius", [(0.0, 0.0, 0.0), (float("inf"), 1.0, 1.0)])
 def test_impossible_radii_are_refused(
-    skin: bpy.types.Material, radius: tuple[float, float, float]
+    material: bpy.types.Material, radius: tuple[float, float, float]
 ) -> None:
     with pytest.raises(RuntimeError, match="scatter radius"):
         bpy.ops.cdrf.measure(radius=radius)

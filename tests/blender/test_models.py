@@ -29,15 +29,15 @@ STORED = 1e-6
 def egg(rig: Rig) -> bpy.types.Object:
     """A translucent, not quite round body of 2 m, with a sun."""
     rig.light("SUN", angle=0.0)
-    item = rig.sphere(subdivisions=3)
-    item.scale = (1.0, 1.0, 1.01)
+    obj = rig.sphere(subdivisions=3)
+    obj.scale = (1.0, 1.0, 1.01)
     bpy.context.view_layer.update()
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    return item
+    return obj
 
 
-def group_of(item: bpy.types.Object) -> bpy.types.ShaderNodeTree:
-    node = cdrf_node(item)
+def group_of(obj: bpy.types.Object) -> bpy.types.ShaderNodeTree:
+    node = cdrf_node(obj)
     assert node is not None
     return node.node_tree
 
@@ -148,7 +148,7 @@ def test_soft_lights_cost_a_profile_three_look_ups_and_resizing_is_noticed(
 
     egg.active_material.cdrf.model = PROFILE
     assert [light.lookups for light in wired_lights(group_of(egg))] == ["RGB"]
-    sun = next(item for item in rig.scene.objects if item.type == "LIGHT")
+    sun = next(obj for obj in rig.scene.objects if obj.type == "LIGHT")
     sun.data.angle = math.radians(10.0)
     reasons = state.reasons_to_update(egg, rig.scene, bpy.context.view_layer)
     assert any("another size" in reason for reason in reasons)
@@ -185,13 +185,13 @@ def test_a_preset_looks_the_same_however_the_size_is_made(rig: Rig) -> None:
         (0.001, 10.0, 10.0),
     ):
         rig.scene.unit_settings.scale_length = metres
-        item = rig.sphere(radius, subdivisions=3)
-        item.scale = (scale, scale, 1.01 * scale)
+        obj = rig.sphere(radius, subdivisions=3)
+        obj.scale = (scale, scale, 1.01 * scale)
         bpy.context.view_layer.update()
         assert bpy.ops.cdrf.setup() == {"FINISHED"}
         assert bpy.ops.cdrf.preset(preset="MARBLE") == {"FINISHED"}
-        blurs.append(item.active_material.cdrf.sigma0 * item.data.cdrf.median)
-        bpy.data.objects.remove(item)
+        blurs.append(obj.active_material.cdrf.sigma0 * obj.data.cdrf.median)
+        bpy.data.objects.remove(obj)
     assert blurs == pytest.approx([blurs[0]] * 4, rel=1e-4)
 
 
@@ -220,12 +220,12 @@ def test_color_too_leaves_textures_alone(egg: bpy.types.Object) -> None:
     assert node.inputs[ids.BASE_COLOR].is_linked
 
 
-def test_a_principled_skin_is_translucent_with_one_click(rig: Rig) -> None:
+def test_a_principled_material_is_translucent_with_one_click(rig: Rig) -> None:
     rig.light("SUN", angle=0.0)
     material, _ = scattering_material()
-    item = rig.sphere(subdivisions=3)
-    item.scale = (1.0, 1.0, 1.01)
-    item.data.materials.append(material)
+    obj = rig.sphere(subdivisions=3)
+    obj.scale = (1.0, 1.0, 1.01)
+    obj.data.materials.append(material)
     bpy.context.view_layer.update()
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
     factors = sigma0_per_radius((0.8, 0.5, 0.4), walk_method("RANDOM_WALK"))
@@ -260,7 +260,7 @@ def test_what_feeds_a_principled_node_is_read_through(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("case", ["no weight", "no scale", "diffuse", "empty", "loop"])
-def test_a_material_that_does_not_scatter_is_said_to(rig: Rig, case: str) -> None:
+def test_a_material_that_does_not_scatter_is_recognised(rig: Rig, case: str) -> None:
     material, principled = scattering_material()
     tree = material.node_tree
     if case == "no weight":

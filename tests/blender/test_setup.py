@@ -26,12 +26,12 @@ def attribute(mesh: bpy.types.Mesh) -> np.ndarray:
     return values.reshape(-1, 4)
 
 
-def reasons(item: bpy.types.Object) -> str:
+def reasons(obj: bpy.types.Object) -> str:
     from cdrf_addon.blender.state import reasons_to_update
 
     bpy.context.view_layer.update()
     scene, layer = bpy.context.scene, bpy.context.view_layer
-    return " ".join(reasons_to_update(item, scene, layer))
+    return " ".join(reasons_to_update(obj, scene, layer))
 
 
 def torus(major: float = 1.0, minor: float = 0.25) -> bpy.types.Object:
@@ -50,10 +50,10 @@ def refuses(call: object, *words: str) -> None:
 
 @pytest.mark.smoke
 def test_torus_gets_its_curvature_in_all_four_channels(rig: Rig) -> None:
-    item = torus()
+    obj = torus()
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    kappa, k1, k2, mean = attribute(item.data).T
-    points = np.array([v.co for v in item.data.vertices])
+    kappa, k1, k2, mean = attribute(obj.data).T
+    points = np.array([v.co for v in obj.data.vertices])
     ring = np.hypot(points[:, 0], points[:, 1])
     expected_k1 = np.full(len(points), 1.0 / 0.25)
     expected_k2 = (ring - 1.0) / 0.25 / ring
@@ -66,23 +66,23 @@ def test_torus_gets_its_curvature_in_all_four_channels(rig: Rig) -> None:
 
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (0.01, 0.01, 0.01), (-1.0, 1.0, 1.0)])
 def test_object_scale_is_honoured(rig: Rig, scale: tuple[float, float, float]) -> None:
-    item = torus()
+    obj = torus()
     bpy.ops.cdrf.setup()
-    before = attribute(item.data)
-    item.scale = scale
+    before = attribute(obj.data)
+    obj.scale = scale
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     # A mirrored object keeps its outside, so k1 stays positive. libigl's k1 and k2 depend on the
     # frame it finds in a mirrored mesh: 1 % of the largest.
-    error = np.abs(attribute(item.data) * abs(scale[0]) - before).max()
+    error = np.abs(attribute(obj.data) * abs(scale[0]) - before).max()
     assert error <= 0.01 * before.max()
 
 
 def test_stretched_object_is_an_ellipsoid(rig: Rig) -> None:
-    item = rig.sphere(subdivisions=6)
-    item.scale = (1.0, 1.0, 2.0)
+    obj = rig.sphere(subdivisions=6)
+    obj.scale = (1.0, 1.0, 2.0)
     bpy.ops.cdrf.setup()
-    points = np.array([v.co for v in item.data.vertices])
-    pole = attribute(item.data)[points[:, 2].argmax()]
+    points = np.array([v.co for v in obj.data.vertices])
+    pole = attribute(obj.data)[points[:, 2].argmax()]
     # Semi-axes 1, 1, 2: both curvatures at the pole are c / a^2 = 2.
     assert np.allclose(pole, 2.0, rtol=0.02)
 
@@ -102,22 +102,22 @@ def test_flat_and_spherical_meshes_need_no_attribute(rig: Rig) -> None:
     assert cdrf_node(ball).inputs["Curvature"].default_value == pytest.approx(2.0, rel=1e-6)
 
     # Once the ball's material is on a torus too, one number no longer serves.
-    item = torus()
-    item.data.materials.append(ball.data.materials[0])
+    obj = torus()
+    obj.data.materials.append(ball.data.materials[0])
     bpy.ops.cdrf.setup()
     assert np.allclose(attribute(ball.data), 2.0, rtol=1e-5)
-    assert len(attribute(item.data)) == len(item.data.vertices)
+    assert len(attribute(obj.data)) == len(obj.data.vertices)
 
 
 def test_channels_that_share_sigma0_share_a_lookup(rig: Rig) -> None:
     rig.light("SUN")
-    item = torus()
+    obj = torus()
     bpy.ops.cdrf.setup()
-    settings = item.data.materials[0].cdrf
+    settings = obj.data.materials[0].cdrf
 
     def lookups() -> int:
         group = next(
-            n for n in cdrf_node(item).node_tree.nodes if n.name.startswith("Reflectance")
+            n for n in cdrf_node(obj).node_tree.nodes if n.name.startswith("Reflectance")
         ).node_tree
         return sum(node.type == "TEX_IMAGE" for node in group.nodes)
 
@@ -134,72 +134,71 @@ def test_channels_that_share_sigma0_share_a_lookup(rig: Rig) -> None:
 
 def test_slider_never_rebuilds_the_table(rig: Rig) -> None:
     rig.light("SUN")
-    item = torus()
+    obj = torus()
     bpy.ops.cdrf.setup()
     image = bpy.data.images[f"{ids.LUT_IMAGE} Sphere"]
     groups = {group.name: len(group.nodes) for group in bpy.data.node_groups}
     for value in (0.0, 1e-6, 0.5, 1e4):
-        item.data.materials[0].cdrf.sigma0 = value
-        assert item.data.materials[0].cdrf.sigma0 == pytest.approx(value)
+        obj.data.materials[0].cdrf.sigma0 = value
+        assert obj.data.materials[0].cdrf.sigma0 == pytest.approx(value)
     assert [i for i in bpy.data.images if i.name.startswith("CDRF")] == [image]
     assert {group.name: len(group.nodes) for group in bpy.data.node_groups} == groups
 
 
 def test_senseless_sigma0_is_clamped(rig: Rig) -> None:
-    item = torus()
-    settings = item.data.materials
+    obj = torus()
     bpy.ops.cdrf.setup()
-    skin = settings[0].cdrf
+    settings = obj.data.materials[0].cdrf
     for value, kept in ((-1.0, 0.0), (math.nan, 0.0), (math.inf, 1e6), (1e30, 1e6)):
-        skin.sigma0 = value
-        assert skin.sigma0 == kept
-    skin.sigma0_ratio = (math.nan, -1.0, math.inf)
-    assert tuple(skin.sigma0_ratio) == (0.0, 0.0, 1e3)
+        settings.sigma0 = value
+        assert settings.sigma0 == kept
+    settings.sigma0_ratio = (math.nan, -1.0, math.inf)
+    assert tuple(settings.sigma0_ratio) == (0.0, 0.0, 1e3)
 
 
 def test_sigma0_set_before_setup_is_kept(rig: Rig) -> None:
-    item = torus()
+    obj = torus()
     material = bpy.data.materials.new("Jade")
-    item.data.materials.append(material)
+    obj.data.materials.append(material)
     material.cdrf.sigma0, material.cdrf.sigma0_ratio = 0.07, (0.2, 1.0, 0.5)
     bpy.ops.cdrf.setup()
-    assert cdrf_node(item).inputs["Sigma0"].default_value == pytest.approx(0.07)
-    assert tuple(cdrf_node(item).inputs["Sigma0 Ratio"].default_value) == pytest.approx(
+    assert cdrf_node(obj).inputs["Sigma0"].default_value == pytest.approx(0.07)
+    assert tuple(cdrf_node(obj).inputs["Sigma0 Ratio"].default_value) == pytest.approx(
         (0.2, 1.0, 0.5)
     )
 
 
 @pytest.mark.smoke
 def test_nothing_is_recomputed_without_a_reason(rig: Rig) -> None:
-    item = torus()
+    obj = torus()
     bpy.ops.cdrf.setup()
     # A mark in the attribute would be overwritten by a recomputation.
-    item.data.attributes[ids.CURVATURE_ATTRIBUTE].data[0].color = (7.0, 7.0, 7.0, 7.0)
+    obj.data.attributes[ids.CURVATURE_ATTRIBUTE].data[0].color = (7.0, 7.0, 7.0, 7.0)
     bpy.ops.cdrf.setup()
-    item.rotation_euler = (0.3, 0.2, 0.1)
-    item.location = (5.0, 0.0, 0.0)
+    obj.rotation_euler = (0.3, 0.2, 0.1)
+    obj.location = (5.0, 0.0, 0.0)
     bpy.ops.cdrf.update()
-    assert attribute(item.data)[0, 0] == 7.0
-    item.data.vertices[5].co.z += 0.02
-    item.data.update()
+    assert attribute(obj.data)[0, 0] == 7.0
+    obj.data.vertices[5].co.z += 0.02
+    obj.data.update()
     bpy.ops.cdrf.update()
-    assert attribute(item.data)[0, 0] != 7.0
+    assert attribute(obj.data)[0, 0] != 7.0
 
 
 def test_lights_added_removed_and_retyped_are_noticed(rig: Rig) -> None:
     from cdrf_addon.blender.state import reasons_to_update
 
-    item = torus()
+    obj = torus()
     key = rig.light("SUN", name="Key")
     bpy.context.view_layer.update()
     bpy.ops.cdrf.setup()
 
     def due() -> str:
         bpy.context.view_layer.update()
-        return " ".join(reasons_to_update(item, rig.scene, bpy.context.view_layer))
+        return " ".join(reasons_to_update(obj, rig.scene, bpy.context.view_layer))
 
     def branches() -> set[str]:
-        nodes = cdrf_node(item).node_tree.nodes
+        nodes = cdrf_node(obj).node_tree.nodes
         return {n[ids.LIGHT_KEY] for n in nodes if ids.LIGHT_KEY in n}
 
     assert due() == "" and branches() == {"SUN"}
@@ -226,20 +225,20 @@ def test_lights_added_removed_and_retyped_are_noticed(rig: Rig) -> None:
 def test_light_linking_chooses_the_branches_of_each_material(rig: Rig) -> None:
     first, second = rig.sphere(), rig.sphere()
     key, rim, _both = (rig.light("SUN", name=name) for name in ("Key", "Rim", "Both"))
-    for item in (first, second):
-        item.select_set(True)
+    for obj in (first, second):
+        obj.select_set(True)
     bpy.ops.cdrf.setup()
     assert cdrf_node(first).node_tree == cdrf_node(second).node_tree
-    for light, item in ((key, first), (rim, second)):
+    for light, obj in ((key, first), (rim, second)):
         light.light_linking.receiver_collection = bpy.data.collections.new(light.name)
-        light.light_linking.receiver_collection.objects.link(item)
+        light.light_linking.receiver_collection.objects.link(obj)
 
-    def due(item: bpy.types.Object) -> str:
+    def due(obj: bpy.types.Object) -> str:
         bpy.context.view_layer.update()
-        return " ".join(state.reasons_to_update(item, rig.scene, bpy.context.view_layer))
+        return " ".join(state.reasons_to_update(obj, rig.scene, bpy.context.view_layer))
 
-    def lamps(item: bpy.types.Object) -> set[str]:
-        wired = wired_lights(cdrf_node(item).node_tree)
+    def lamps(obj: bpy.types.Object) -> set[str]:
+        wired = wired_lights(cdrf_node(obj).node_tree)
         return {branch.object.name for branch in wired if branch.object is not None}
 
     assert "linked to other objects" in due(first)
@@ -318,9 +317,9 @@ def test_instanced_lights_deleted_and_nested(rig: Rig) -> None:
 def test_every_driver_is_free_of_python(rig: Rig) -> None:
     for kind in ("SUN", "POINT", "SPOT", "AREA"):
         rig.light(kind)
-    item = torus()
+    obj = torus()
     bpy.ops.cdrf.setup()
-    drivers = cdrf_node(item).node_tree.animation_data.drivers
+    drivers = cdrf_node(obj).node_tree.animation_data.drivers
     assert len(drivers) > 30
     assert all(curve.driver.is_simple_expression and curve.driver.is_valid for curve in drivers)
 
@@ -354,13 +353,13 @@ def test_refusals_say_what_to_do(rig: Rig) -> None:
     refuses(bpy.ops.cdrf.update, "Make Translucent")
     bpy.ops.object.text_add()
     refuses(bpy.ops.cdrf.setup, "No mesh object is selected")
-    item = torus()
+    obj = torus()
     bpy.ops.object.mode_set(mode="EDIT")
     refuses(bpy.ops.cdrf.setup, "Object Mode")
     bpy.ops.object.mode_set(mode="OBJECT")
-    item.scale = (0.0, 1.0, 1.0)
+    obj.scale = (0.0, 1.0, 1.0)
     refuses(bpy.ops.cdrf.setup, "scale of zero")
-    assert not item.data.materials, "a refusal changes nothing"
+    assert not obj.data.materials, "a refusal changes nothing"
     empty = rig.link(bpy.data.meshes.new("Nothing"))
     bpy.ops.object.select_all(action="DESELECT")
     empty.select_set(True)
@@ -368,9 +367,9 @@ def test_refusals_say_what_to_do(rig: Rig) -> None:
 
 
 def test_linked_data_is_refused_and_untouched(rig: Rig, tmp_path: Path) -> None:
-    item = torus()
-    item.name = "Linked"
-    item.data.materials.append(bpy.data.materials.new("Stone"))
+    obj = torus()
+    obj.name = "Linked"
+    obj.data.materials.append(bpy.data.materials.new("Stone"))
     file = tmp_path / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=True)
     fresh = Rig()
@@ -409,14 +408,14 @@ def test_undo_takes_back_each_operator(rig: Rig) -> None:
     assert cdrf_of(ring()) is not None
 
 
-def cdrf_of(item: bpy.types.Object) -> object:
+def cdrf_of(obj: bpy.types.Object) -> object:
     from cdrf_addon.blender.material.install import cdrf_node as find
 
-    return find(item.active_material)
+    return find(obj.active_material)
 
 
 def test_existing_material_is_kept_and_comes_back(rig: Rig) -> None:
-    item = torus()
+    obj = torus()
     material = bpy.data.materials.new("Painted")
     from cdrf_addon.compat import ensure_node_tree
 
@@ -426,10 +425,10 @@ def test_existing_material_is_kept_and_comes_back(rig: Rig) -> None:
     bump = tree.nodes.new("ShaderNodeBump")
     tree.links.new(texture.outputs["Color"], principled.inputs["Base Color"])
     tree.links.new(bump.outputs["Normal"], principled.inputs["Normal"])
-    item.data.materials.append(material)
+    obj.data.materials.append(material)
     before = {node.name for node in tree.nodes}, len(tree.links)
     bpy.ops.cdrf.setup()
-    node = cdrf_node(item)
+    node = cdrf_node(obj)
     assert node.inputs["Base Color"].links[0].from_node == texture
     assert node.inputs["Normal"].links[0].from_node == bump
     assert tree.get_output_node("EEVEE").name == ids.OUTPUT_NODE
@@ -438,74 +437,74 @@ def test_existing_material_is_kept_and_comes_back(rig: Rig) -> None:
     bpy.ops.cdrf.remove()
     assert ({n.name for n in tree.nodes}, len(tree.links)) == before
     assert tree.get_output_node("EEVEE") == cycles
-    assert ids.CURVATURE_ATTRIBUTE not in item.data.attributes
+    assert ids.CURVATURE_ATTRIBUTE not in obj.data.attributes
 
 
 def test_modifiers_carry_the_curvature_to_the_evaluated_mesh(rig: Rig) -> None:
     bpy.ops.mesh.primitive_monkey_add()
-    item = bpy.context.object
-    item.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    obj = bpy.context.object
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
     bpy.ops.cdrf.setup()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    evaluated = item.evaluated_get(depsgraph).to_mesh()
+    evaluated = obj.evaluated_get(depsgraph).to_mesh()
     values = attribute(evaluated)
-    assert len(values) == len(evaluated.vertices) > len(item.data.vertices)
+    assert len(values) == len(evaluated.vertices) > len(obj.data.vertices)
     assert np.isfinite(values).all() and (values[:, 0] > 0.0).mean() > 0.99
-    assert not [stored for stored in item.data.attributes if "origin" in stored.name]
+    assert not [stored for stored in obj.data.attributes if "origin" in stored.name]
 
 
 def test_save_and_reload_keeps_everything(rig: Rig, tmp_path: Path) -> None:
     from cdrf_addon.blender.state import reasons_to_update
 
     rig.light("SUN")
-    item = torus()
+    obj = torus()
     bpy.context.view_layer.update()
     bpy.ops.cdrf.setup()
-    item.data.materials[0].cdrf.sigma0 = 0.123
-    item.name = "Kept"
-    values = attribute(item.data)
+    obj.data.materials[0].cdrf.sigma0 = 0.123
+    obj.name = "Kept"
+    values = attribute(obj.data)
     image = bpy.data.images[f"{ids.LUT_IMAGE} Sphere"]
     table = np.array(image.pixels)
     file = tmp_path / "kept.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     bpy.ops.wm.open_mainfile(filepath=str(file))
-    item = bpy.data.objects["Kept"]
-    assert item.data.materials[0].cdrf.sigma0 == pytest.approx(0.123)
-    assert np.array_equal(attribute(item.data), values)
+    obj = bpy.data.objects["Kept"]
+    assert obj.data.materials[0].cdrf.sigma0 == pytest.approx(0.123)
+    assert np.array_equal(attribute(obj.data), values)
     image = bpy.data.images[f"{ids.LUT_IMAGE} Sphere"]
     assert image.packed_file is not None and image.is_float
     assert image.colorspace_settings.is_data
     assert np.array_equal(np.array(image.pixels), table), "the packed table is exact"
-    assert reasons_to_update(item, bpy.context.scene, bpy.context.view_layer) == []
+    assert reasons_to_update(obj, bpy.context.scene, bpy.context.view_layer) == []
 
 
 def test_render_slots_and_object_slots(rig: Rig) -> None:
-    item = torus()
+    obj = torus()
     for name in ("Skin", "Eye"):
-        item.data.materials.append(bpy.data.materials.new(name))
-    item.active_material_index = 0
+        obj.data.materials.append(bpy.data.materials.new(name))
+    obj.active_material_index = 0
     bpy.ops.cdrf.setup(only_active_slot=True)
-    assert cdrf_of(item) is not None
-    eye = item.data.materials[1]
+    assert cdrf_of(obj) is not None
+    eye = obj.data.materials[1]
     assert eye.node_tree is None or ids.NODE not in eye.node_tree.nodes
     bpy.ops.cdrf.setup()
     assert ids.NODE in eye.node_tree.nodes
 
 
 def test_curvature_display_follows_an_update_and_goes_away(rig: Rig) -> None:
-    item = rig.sphere()
+    obj = rig.sphere()
     bpy.ops.cdrf.setup()
-    tree = item.data.materials[0].node_tree
+    tree = obj.data.materials[0].node_tree
     before = {node.name for node in tree.nodes}
     bpy.ops.cdrf.show_curvature(display="ON")
     assert tree.nodes[ids.DISPLAY_NODE].inputs["Curvature"].default_value == pytest.approx(1.0)
     # No sphere any more: the display reads the attribute from now on.
-    item.data.vertices[0].co *= 1.5
-    item.data.update()
+    obj.data.vertices[0].co *= 1.5
+    obj.data.update()
     bpy.ops.cdrf.update()
     shown = tree.nodes[ids.DISPLAY_NODE]
     assert shown.inputs["Curvature"].is_linked
-    assert shown.inputs["Maximum"].default_value == pytest.approx(item.data.cdrf.high)
+    assert shown.inputs["Maximum"].default_value == pytest.approx(obj.data.cdrf.high)
     bpy.ops.cdrf.show_curvature(display="OFF")
     assert {node.name for node in tree.nodes} == before
     surface = tree.nodes[ids.OUTPUT_NODE].inputs["Surface"]
@@ -513,21 +512,21 @@ def test_curvature_display_follows_an_update_and_goes_away(rig: Rig) -> None:
 
 
 def test_deleted_parts_come_back_at_the_next_update(rig: Rig) -> None:
-    from cdrf_addon.blender.material.install import skin_output
+    from cdrf_addon.blender.material.install import cdrf_output
     from cdrf_addon.blender.nodes.tree import is_intact
     from cdrf_addon.blender.state import reasons_to_update
 
     rig.light("SUN")
-    item = torus()
+    obj = torus()
     bpy.context.view_layer.update()
     bpy.ops.cdrf.setup()
-    material = item.data.materials[0]
+    material = obj.data.materials[0]
 
     def whole() -> bool:
-        reasons = reasons_to_update(item, rig.scene, bpy.context.view_layer)
+        reasons = reasons_to_update(obj, rig.scene, bpy.context.view_layer)
         output = material.node_tree.get_output_node("EEVEE")
-        linked = output == skin_output(material) and output.inputs["Surface"].is_linked
-        return not reasons and linked and is_intact(cdrf_node(item).node_tree)
+        linked = output == cdrf_output(material) and output.inputs["Surface"].is_linked
+        return not reasons and linked and is_intact(cdrf_node(obj).node_tree)
 
     assert whole()
     bpy.data.images.remove(bpy.data.images[f"{ids.LUT_IMAGE} Sphere"])
@@ -538,11 +537,11 @@ def test_deleted_parts_come_back_at_the_next_update(rig: Rig) -> None:
     assert not whole()
     bpy.ops.cdrf.update()
     assert whole()
-    material.node_tree.nodes.remove(skin_output(material))
+    material.node_tree.nodes.remove(cdrf_output(material))
     assert not whole()
     bpy.ops.cdrf.update()
     assert whole()
-    output = skin_output(material)
+    output = cdrf_output(material)
     assert output is not None
     output.name = "Renamed"
     bpy.ops.cdrf.remove()
@@ -556,11 +555,11 @@ def test_small_values_reach_the_shader_unsnapped(rig: Rig) -> None:
     name = 'Key "A" \\ b'
     lamp = rig.light("SPOT", name=name, energy=1e-5, location=(5e-5, 0.99995, 1.0))
     lamp.data.spot_size = math.radians(1.0)
-    item = torus()
+    obj = torus()
     bpy.context.view_layer.update()
     bpy.ops.cdrf.setup()
     bpy.context.view_layer.update()
-    inputs = cdrf_node(item).node_tree.nodes[name].inputs
+    inputs = cdrf_node(obj).node_tree.nodes[name].inputs
     assert tuple(inputs["Position"].default_value) == pytest.approx((5e-5, 0.99995, 1.0), rel=1e-6)
     assert inputs["Power"].default_value[0] == pytest.approx(1e-5 / (4 * math.pi**2), rel=1e-5)
     assert inputs["Cone Cosine"].default_value == pytest.approx(math.cos(math.radians(0.5)))
@@ -582,17 +581,17 @@ def test_each_mesh_keeps_its_own_rings(rig: Rig) -> None:
 
 def test_hidden_objects_are_measured_with_their_modifiers(rig: Rig) -> None:
     bpy.ops.mesh.primitive_monkey_add()
-    item = bpy.context.object
-    item.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    obj = bpy.context.object
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
     bpy.ops.cdrf.setup()
-    count = item.data.cdrf.evaluated_vertices
-    item.data.vertices[0].co.z += 0.05
-    item.data.update()
-    item.hide_viewport = True
+    count = obj.data.cdrf.evaluated_vertices
+    obj.data.vertices[0].co.z += 0.05
+    obj.data.update()
+    obj.hide_viewport = True
     bpy.context.view_layer.update()
     bpy.ops.cdrf.update()
-    assert item.data.cdrf.evaluated_vertices == count > len(item.data.vertices)
-    assert item.hide_viewport
+    assert obj.data.cdrf.evaluated_vertices == count > len(obj.data.vertices)
+    assert obj.hide_viewport
 
 
 def test_one_bad_mesh_does_not_stop_the_others(rig: Rig) -> None:
@@ -610,12 +609,12 @@ def test_transparency_is_kept(rig: Rig) -> None:
     from cdrf_addon.compat import ensure_node_tree
 
     rig.light("SUN", rotation=(1.0, 0.0, 0.5))
-    item = torus()
+    obj = torus()
     material = bpy.data.materials.new("Lash")
     tree = ensure_node_tree(material)
     principled = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
     principled.inputs["Alpha"].default_value = 0.0
-    item.data.materials.append(material)
+    obj.data.materials.append(material)
     before = {node.name for node in tree.nodes}
     bpy.ops.cdrf.setup()
     assert rig.render()[..., 3].max() == 0.0
@@ -626,23 +625,23 @@ def test_transparency_is_kept(rig: Rig) -> None:
 
 
 def test_modifier_that_replaces_the_mesh_is_refused(rig: Rig) -> None:
-    item = torus()
-    item.modifiers.new("Remesh", "REMESH").voxel_size = 0.2
+    obj = torus()
+    obj.modifiers.new("Remesh", "REMESH").voxel_size = 0.2
     refuses(bpy.ops.cdrf.setup, "Remesh", "apply")
 
 
 def test_changed_modifiers_are_noticed(rig: Rig) -> None:
     from cdrf_addon.blender.state import reasons_to_update
 
-    item = torus()
+    obj = torus()
     bpy.ops.cdrf.setup()
-    item.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
     bpy.context.view_layer.update()
-    due = reasons_to_update(item, rig.scene, bpy.context.view_layer)
+    due = reasons_to_update(obj, rig.scene, bpy.context.view_layer)
     assert any("modifiers" in reason for reason in due)
     bpy.ops.cdrf.update()
     bpy.context.view_layer.update()
-    assert reasons_to_update(item, rig.scene, bpy.context.view_layer) == []
+    assert reasons_to_update(obj, rig.scene, bpy.context.view_layer) == []
 
 
 def test_linked_skin_is_named_in_the_refusal(rig: Rig, tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The batch script: its arguments, its pictures, its summary, and what it does about failures."""
+"""The batch renderer: its arguments, pictures, summary, and what failures lead to."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ import numpy as np
 import pytest
 from rig import Rig
 
-from cdrf_addon.command import batch as batch_render
+from cdrf_addon.command import batch_run
+from cdrf_addon.command.batch_job import SceneJob, sigma0_label, unique_stems
+from cdrf_addon.command.batch_options import parse_frames, parse_options, parse_resolution
+from cdrf_addon.command.batch_summary import PictureRecord, SceneRecord
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = ["--resolution", "32", "--samples", "1"]
@@ -57,19 +60,19 @@ def meshes(rig: Rig, tmp_path: Path) -> dict[str, Path]:
     [("7", [7]), ("1-3", [1, 2, 3]), ("1-9:4", [1, 5, 9]), ("1,4,8-9", [1, 4, 8, 9]), ("-2", [-2])],
 )
 def test_frames(text: str, frames: list[int]) -> None:
-    assert batch_render.parse_frames(text) == frames
+    assert parse_frames(text) == frames
 
 
 @pytest.mark.parametrize("text", ["", "a", "5-1", "1-2-3", "1:0"])
 def test_frames_that_are_none(text: str) -> None:
     with pytest.raises(ArgumentTypeError):
-        batch_render.parse_frames(text)
+        parse_frames(text)
 
 
 @pytest.mark.parametrize("text", ["0", "x", "640x", "10x10x10", "1x1", "99999"])
 def test_resolutions_that_are_none(text: str) -> None:
     with pytest.raises(ArgumentTypeError):
-        batch_render.parse_resolution(text)
+        parse_resolution(text)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +86,7 @@ def test_resolutions_that_are_none(text: str) -> None:
     ],
 )
 def test_wrong_command_lines_exit_with_2(arguments: list[str], tmp_path: Path) -> None:
-    assert batch_render.main([*arguments, "--output", str(tmp_path)]) == 2
+    assert batch_run.main([*arguments, "--output", str(tmp_path)]) == 2
 
 
 @pytest.mark.smoke
@@ -96,8 +99,8 @@ def test_every_mesh_format_and_a_failure_among_them(
     inputs = [meshes["obj"], broken, meshes["ply"], tmp_path / "absent.blend", meshes["stl"]]
     result = run(*inputs, meshes["glb"], "--output", out, *SMALL)
     assert result.returncode == 1, result.stdout + result.stderr
-    told = summary(out)
-    assert [s["state"] for s in told["scenes"]] == [
+    found = summary(out)
+    assert [s["state"] for s in found["scenes"]] == [
         "done",
         "failed",
         "done",
@@ -105,10 +108,10 @@ def test_every_mesh_format_and_a_failure_among_them(
         "done",
         "done",
     ]
-    assert told["failed"] == 2
-    assert "no mesh with faces" in told["scenes"][1]["error"]
-    assert "does not exist" in told["scenes"][3]["error"]
-    for scene in told["scenes"]:
+    assert found["failed"] == 2
+    assert "no mesh with faces" in found["scenes"][1]["error"]
+    assert "does not exist" in found["scenes"][3]["error"]
+    for scene in found["scenes"]:
         for image in scene["images"]:
             assert np.isfinite(picture(Path(image["path"]))).all()
             assert picture(Path(image["path"]))[..., :3].max() > 0.2
@@ -131,7 +134,7 @@ def test_sigma0_list_lambert_and_resume(meshes: dict[str, Path], tmp_path: Path)
     assert np.abs(left - right).max() > 0.02, "translucency shows"
     assert len(summary(out)["scenes"][0]["images"]) == 4
 
-    # Broken off: one picture is missing. Only that one is made again.
+    # As after a kill: one picture is missing. Only that one is made again.
     stamps = {p.name: p.stat().st_mtime_ns for p in out.glob("*_s0.05_*.png")}
     (out / "ring_s0.3_0002.png").unlink()
     second = run(*arguments, "--output", out)
@@ -143,9 +146,9 @@ def test_sigma0_list_lambert_and_resume(meshes: dict[str, Path], tmp_path: Path)
 def test_prepared_scene_keeps_its_settings(rig: Rig, tmp_path: Path) -> None:
     rig.light("SUN", rotation=(1.0, 0.0, 0.5))
     bpy.ops.mesh.primitive_torus_add()
-    item = bpy.context.object
+    obj = bpy.context.object
     bpy.ops.cdrf.setup()
-    item.data.materials[0].cdrf.sigma0 = 0.2
+    obj.data.materials[0].cdrf.sigma0 = 0.2
     rig.scene.render.resolution_x = rig.scene.render.resolution_y = 24
     file = tmp_path / "prepared.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=True)
@@ -161,15 +164,15 @@ def test_prepared_scene_keeps_its_settings(rig: Rig, tmp_path: Path) -> None:
 
 def test_unique_stems() -> None:
     paths = [Path("a/x.obj"), Path("b/x.obj"), Path("x-2.ply")]
-    assert batch_render.unique_stems(paths) == ["x", "x-2", "x-2-2"]
+    assert unique_stems(paths) == ["x", "x-2", "x-2-2"]
 
 
 def test_animated_sigma0_is_replaced_and_display_taken_off(rig: Rig, tmp_path: Path) -> None:
     rig.light("SUN", rotation=(1.0, 0.0, 0.9))
     bpy.ops.mesh.primitive_torus_add()
-    item = bpy.context.object
+    obj = bpy.context.object
     bpy.ops.cdrf.setup()
-    node = item.data.materials[0].node_tree.nodes["CDRF"]
+    node = obj.data.materials[0].node_tree.nodes["CDRF"]
     for frame, value in ((1, 0.0), (3, 0.1)):
         node.inputs["Sigma0"].default_value = value
         node.inputs["Sigma0"].keyframe_insert("default_value", frame=frame)
@@ -186,9 +189,9 @@ def test_animated_sigma0_is_replaced_and_display_taken_off(rig: Rig, tmp_path: P
     notes = " ".join(summary(forced)["scenes"][0]["warnings"])
     assert "animated or connected" in notes and "showing its curvature" in notes
     lambert = picture(kept / "animated_lambert_0003.png")
-    skin = picture(kept / "animated_cdrf_0003.png")
-    assert np.abs(lambert - skin).max() > 0.02
-    assert np.array_equal(skin, picture(forced / "animated_s0.1_0003.png"))
+    translucent = picture(kept / "animated_cdrf_0003.png")
+    assert np.abs(lambert - translucent).max() > 0.02
+    assert np.array_equal(translucent, picture(forced / "animated_s0.1_0003.png"))
     assert np.array_equal(lambert, picture(forced / "animated_lambert_0003.png"))
 
 
@@ -202,5 +205,23 @@ def test_journal_survives_a_kill_and_any_summary(meshes: dict[str, Path], tmp_pa
 
 
 def test_close_sigmas_have_files_of_their_own() -> None:
-    labels = {batch_render._label(value) for value in (0.123456789, 0.12345678, 0.1, 1.0, 1e-7)}
+    labels = {sigma0_label(value) for value in (0.123456789, 0.12345678, 0.1, 1.0, 1e-7)}
     assert labels == {"s0.123456789", "s0.12345678", "s0.1", "s1", "s1e-07"}
+
+
+def test_the_order_and_the_answer_of_a_process_survive_json() -> None:
+    line = ["a/x.obj", "y.blend", "--sigma0", "0.1", "0.2", "--ratio", "1", "0.5", "0"]
+    line += ["--frames", "1-3", "--resolution", "64x32", "--output", "out", "--curvature"]
+    options = parse_options(line)
+    assert options.inputs == (Path("a/x.obj"), Path("y.blend"))
+    assert (options.frames, options.resolution) == ((1, 2, 3), (64, 32))
+    job = SceneJob(options.inputs[0], "x", options, {"out/x_s0.1_0001.png": "key"})
+    assert SceneJob.from_json(json.dumps(job.as_json())) == job
+    rendered = PictureRecord("p.png", "key", 1.5, frame=3, lambert="l.png", side_by_side="s.png")
+    images = [PictureRecord("c.png", "key", resumed=True), rendered]
+    record = SceneRecord("x.obj", "done", warnings=["a note"], images=images)
+    written = json.loads(json.dumps(record.as_json()))
+    assert set(written["images"][0]) == {"path", "key", "seconds", "resumed"}
+    # The file's own scatter distance is null, and there.
+    assert written["images"][1]["sigma0"] is None
+    assert SceneRecord.from_json(written) == record

@@ -10,17 +10,21 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from rig import Rig
 
-from cdrf_addon.command import fit
+from cdrf_addon.command import fit_run
+from cdrf_addon.command.fit_options import parse_options
+from cdrf_addon.compat import ensure_node_tree
+from cdrf_addon.core.errors import MeasurementError
 from cdrf_addon.core.measured.material_fit import fit_material
 from cdrf_addon.core.measured.measurement import SphereMeasurement, load
 from cdrf_addon.core.measured.model import MeasuredModel
 from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
-from cdrf_addon.measuring import process as measuring
+from cdrf_addon.measuring import process
 from cdrf_addon.measuring.figure import decades, draw_fit, steps
 from cdrf_addon.measuring.plot import open_in_blender
-from cdrf_addon.measuring.process import QUALITIES, Quality
 from cdrf_addon.measuring.raster import Raster
+from cdrf_addon.measuring.request import QUALITIES, Quality
 
 
 @pytest.mark.smoke
@@ -35,7 +39,7 @@ def test_the_command_writes_its_three_files(
     out = tmp_path / "out"
     arguments = ["--color", "0.9", "0.8", "0.7", "--radius", "1", "0.5", "0", "--scale", "2"]
     arguments += ["--unit", "mm", "--quality", "preview", "--no-cache", "--output", str(out)]
-    assert fit.main(arguments) == 0
+    assert fit_run.main(arguments) == 0
     assert sorted(path.name for path in out.iterdir() if path.suffix != ".npz") == [
         "fit.json",
         "fit.png",
@@ -52,13 +56,13 @@ def test_the_command_writes_its_three_files(
     measurement = load(out / "measured.npz")
     assert len(red["spheres"]) == len(measurement.scales)
     assert measurement.albedo == pytest.approx([0.9, 0.8, 0.7])
-    told = capsys.readouterr().out
-    assert "σ = σ0 κ holds" in told
-    assert "fit.json" in told
+    printed = capsys.readouterr().out
+    assert "σ = σ0 κ holds" in printed
+    assert "fit.json" in printed
     image = open_in_blender(out / "fit.png", "CDRF Fit")
     assert min(image.size) > 900
     again = open_in_blender(out / "fit.png", "CDRF Fit")
-    assert [item.name for item in bpy.data.images] == ["CDRF Fit"]
+    assert [image.name for image in bpy.data.images] == ["CDRF Fit"]
     assert again.packed_file is not None
 
 
@@ -79,15 +83,15 @@ def test_the_command_writes_its_three_files(
     ],
 )
 def test_wrong_command_lines_exit_with_2(arguments: list[str], tmp_path: Path) -> None:
-    assert fit.main([*arguments, "--output", str(tmp_path)]) == 2
+    assert fit_run.main([*arguments, "--output", str(tmp_path)]) == 2
     assert list(tmp_path.iterdir()) == []
 
 
 def test_help_teaches(capsys: pytest.CaptureFixture[str]) -> None:
-    assert fit.main(["--help"]) == 0
-    told = capsys.readouterr().out
+    assert fit_run.main(["--help"]) == 0
+    printed = capsys.readouterr().out
     for word in ("examples", "--color", "mm", "sigma0", "cache"):
-        assert word in told
+        assert word in printed
 
 
 def test_a_failure_exits_with_1(
@@ -95,22 +99,43 @@ def test_a_failure_exits_with_1(
 ) -> None:
     broken = tmp_path / "broken.py"
     broken.write_text("raise RuntimeError('no such device')\n")
-    monkeypatch.setattr(measuring, "WORKER", broken)
-    assert fit.main(["--no-cache", "--output", str(tmp_path / "out")]) == 1
+    monkeypatch.setattr(process, "WORKER", broken)
+    assert fit_run.main(["--no-cache", "--output", str(tmp_path / "out")]) == 1
     assert "no such device" in capsys.readouterr().out
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_ctrl_c_ends_the_child_and_is_told(
+def test_ctrl_c_ends_the_child_and_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def interrupt(_: float) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(time, "sleep", interrupt)
-    assert fit.main(["--no-cache", "--output", str(tmp_path / "out")]) == 130
+    assert fit_run.main(["--no-cache", "--output", str(tmp_path / "out")]) == 130
     assert "Stopped" in capsys.readouterr().out
     assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_material_of_a_file_is_read(rig: Rig, tmp_path: Path) -> None:
+    rig.scene.unit_settings.system = "METRIC"
+    rig.scene.unit_settings.scale_length = 0.1
+    for name, scale in (("Wax", 0.5), ("Paint", 0.0)):
+        material = bpy.data.materials.new(name)
+        material.use_fake_user = True
+        scatter = ensure_node_tree(material).nodes["Principled BSDF"].inputs
+        scatter["Base Color"].default_value = (0.0, 0.6, 0.7, 1.0)
+        scatter["Subsurface Weight"].default_value = 1.0 if scale else 0.0
+        scatter["Subsurface Radius"].default_value = (1.0, 0.5, 0.2)
+        scatter["Subsurface Scale"].default_value = scale
+    blend = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    options = fit_run.read_material(parse_options(["--blend", str(blend)]), blend)
+    assert options.color == pytest.approx((fit_run.LEAST_ALBEDO, 0.6, 0.7))
+    assert options.radius_metres == pytest.approx([0.05, 0.025, 0.01])
+    chosen = parse_options(["--blend", str(blend), "--material", "Paint"])
+    with pytest.raises(MeasurementError, match=r"'Paint' does not scatter.*Wax"):
+        fit_run.read_material(chosen, blend)
 
 
 def test_the_figure_holds_what_was_drawn(rig: object, tmp_path: Path) -> None:

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One life of the installed extension in one Blender; prints what it saw as a line of JSON.
+"""Install, use, disable and uninstall the extension in one Blender; print a report as JSON.
 
 usage: python install_cycle.py ZIP PROFILE_DIR, with BLENDER_USER_RESOURCES=PROFILE_DIR
 
-It runs in a process of its own, because bpy reads the profile on import and because the checkout
-and the environment's own igl and scipy must play no part.
+It runs in a process of its own, because bpy reads the profile on import and because neither the
+checkout nor the environment's own igl and scipy may be used.
 """
 
+import importlib
 import json
+import runpy
 import sys
 from collections.abc import Callable
 from importlib.abc import MetaPathFinder
@@ -45,7 +47,7 @@ def is_ours(value: object) -> bool:
 
 
 def traces() -> list[str]:
-    """Everything that an add-on can hang into Blender, as sorted names."""
+    """Everything that an add-on can register with Blender, as sorted names."""
     found = [f"type {name}" for name in dir(bpy.types)]
     found += [f"operators {name}" for name in dir(bpy.ops)]
     for name in dir(bpy.types):
@@ -62,7 +64,7 @@ def traces() -> list[str]:
 
 
 def our_functions() -> list[Callable[..., object]]:
-    """Every function of the enabled extension; Blender has no list of timers to look into."""
+    """Every function of the enabled extension; Blender does not list its timers."""
     modules = [module for name, module in sys.modules.items() if name.startswith(MODULE)]
     return [
         value
@@ -83,6 +85,33 @@ def main_job() -> dict[str, object]:
         "result": sorted(result),
         "attribute": attribute and [attribute.data_type, attribute.domain],
         "groups": [group.name for group in bpy.data.node_groups],
+    }
+
+
+def measured_file() -> str:
+    """Where a measurement is kept: of a few small spheres, path-traced as an artist's are."""
+    request = importlib.import_module(f"{MODULE}.cdrf_addon.measuring.request")
+    process = importlib.import_module(f"{MODULE}.cdrf_addon.measuring.process")
+    cache = importlib.import_module(f"{MODULE}.cdrf_addon.measuring.cache")
+    request.QUALITIES["preview"] = request.Quality((24, 8), 1, 2)
+    folder = cache.cache_folder()
+    process.measure(request.Request((0.8, 0.5, 0.4), "preview", scales=(0.1, 1.0)), folder)
+    (file,) = folder.glob("*.npz")
+    return str(file)
+
+
+def doors() -> dict[str, object]:
+    """Run the installed extension's command files as Blender does; report whose code they use."""
+    folder = Path(sys.modules[f"{MODULE}.cdrf_addon"].__file__ or "").parent
+    names = ("batch_render", "fit")
+    mains = [runpy.run_path(str(folder / f"{name}.py"))["main"] for name in names]
+    out = profile_dir / "batch"
+    code = mains[0]([str(profile_dir / "absent.obj"), "--output", str(out)])
+    return {
+        "packages": [main.__module__ for main in mains],
+        "copies": [name for name in sys.modules if name.partition(".")[0] == "cdrf_addon"],
+        "code": code,
+        "summary": json.loads((out / "summary.json").read_text()),
     }
 
 
@@ -109,6 +138,8 @@ bpy.ops.extensions.package_install_files(
 )
 report["enabled"] = enabled()
 report["job"] = main_job()
+report["measured"] = measured_file()
+report["doors"] = doors()
 report["bundled"] = bundled_files()
 functions = our_functions()
 

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.smoke
 
 
 def run(*command: object, **options) -> str:
-    """Run a program and return its output; fail with its own words."""
+    """Run a program and return its output; fail with its error."""
     done = subprocess.run(
         [str(part) for part in command],
         capture_output=True,
@@ -53,7 +53,7 @@ def package(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def life(package, tmp_path_factory) -> dict[str, Any]:
-    """What one Blender with a clean profile saw of the extension."""
+    """Report of one Blender with a clean profile: install_cycle.py."""
     home = tmp_path_factory.mktemp("home")
     profile = home / "profile"
     profile.mkdir()
@@ -67,8 +67,8 @@ def life(package, tmp_path_factory) -> dict[str, Any]:
     }
     script = Path(__file__).with_name("install_cycle.py")
     output = run(sys.executable, "-P", script, package, profile, cwd=home, env=environment)
-    seen = json.loads(output.strip().splitlines()[-1])
-    return {**seen, "profile": profile.resolve()}
+    report = json.loads(output.strip().splitlines()[-1])
+    return {**report, "profile": profile.resolve()}
 
 
 def test_zip_holds_what_ships_and_nothing_else(package):
@@ -94,7 +94,7 @@ def test_zip_holds_what_ships_and_nothing_else(package):
 
 
 def test_wheels_fit_this_python(package):
-    """What the abi3 trap would break: Blender takes the Pythons from the wheel names."""
+    """Blender takes the Pythons from the wheel names; see tools/wheel_lock.py on abi3."""
     with zipfile.ZipFile(package) as archive:
         wheels = [name for name in archive.namelist() if name.endswith(".whl")]
     assert {Path(name).name.split("-")[0] for name in wheels} == {"libigl", "scipy"}
@@ -140,6 +140,19 @@ def test_main_job_of_the_installed_extension(life):
     assert life["job"]["result"] == ["FINISHED"]
     assert life["job"]["attribute"] == ["FLOAT_COLOR", "POINT"]
     assert any(name.startswith("CDRF") for name in life["job"]["groups"])
+
+
+def test_measured_tables_are_kept_in_the_folder_of_the_extension(life):
+    own = life["profile"] / "extensions" / ".user" / "user_default" / "cdrf"
+    assert Path(life["measured"]).resolve().parent == own / "measured"
+
+
+def test_commands_run_as_files_use_the_enabled_extension(life):
+    package = "bl_ext.user_default.cdrf.cdrf_addon.command"
+    assert life["doors"]["packages"] == [f"{package}.batch_run", f"{package}.fit_run"]
+    assert life["doors"]["copies"] == []
+    assert life["doors"]["code"] == 1
+    assert "does not exist" in life["doors"]["summary"]["scenes"][0]["error"]
 
 
 def test_disabling_leaves_nothing_behind(life):

@@ -12,8 +12,9 @@ from cdrf_addon.core.errors import MeasurementError
 from cdrf_addon.core.measured.fitting import ModelFitter
 from cdrf_addon.core.measured.measurement import equator_weights
 from cdrf_addon.core.measured.model import MeasuredModel
-from cdrf_addon.measuring import process as measuring
-from cdrf_addon.measuring.process import QUALITIES, Quality, Request, measure, measure_steps
+from cdrf_addon.measuring import process
+from cdrf_addon.measuring.process import measure, measure_steps
+from cdrf_addon.measuring.request import QUALITIES, Quality, Request
 
 # Half octaves, as a table has them, but only those that the fresh spheres need.
 ROWS = tuple(2.0 ** (0.5 * step) for step in range(-12, 0))
@@ -21,7 +22,7 @@ FRESH = (0.11, 0.3)
 SKIN = (0.8, 0.5, 0.4)
 RATIO = (1.0, 0.35, 0.2)
 TINY = Quality((24, 8), 2, 2)
-# Four times the default's paths: what noise is left can be subtracted and hides nothing.
+# Four times the default's paths; the noise that is left is known and is subtracted.
 REFERENCE = Quality((80, 20), 96, 10)
 
 
@@ -63,20 +64,20 @@ def tiny(monkeypatch: pytest.MonkeyPatch) -> Request:
 def test_progress_comes_often_and_the_result_is_kept(
     tiny: Request, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert measuring.POLL_SECONDS <= 0.1  # Esc and the bar stay alive
-    steps, told = measure_steps(tiny, tmp_path), []
+    assert process.POLL_SECONDS <= 0.1  # Esc and the bar stay alive
+    steps, reported = measure_steps(tiny, tmp_path), []
     while True:
         try:
-            told.append(next(steps))
+            reported.append(next(steps))
         except StopIteration as done:
             first = done.value
             break
-    parts = [part for part, _ in told]
+    parts = [part for part, _ in reported]
     assert parts == sorted(parts)
     assert parts[-1] == 1.0
     assert [path.suffix for path in tmp_path.iterdir()] == [".npz"]
     assert first.values.shape[:2] == (3, 3)
-    monkeypatch.setattr(measuring, "WORKER", tmp_path / "none")  # nothing is rendered again
+    monkeypatch.setattr(process, "WORKER", tmp_path / "none")  # nothing is rendered again
     again = measure(tiny, tmp_path)
     assert (again.values == first.values).all()
 
@@ -106,7 +107,7 @@ def test_a_child_that_fails_becomes_a_sentence(
 ) -> None:
     broken = tmp_path / "broken.py"
     broken.write_text("raise RuntimeError('no such device')\n")
-    monkeypatch.setattr(measuring, "WORKER", broken)
+    monkeypatch.setattr(process, "WORKER", broken)
     with pytest.raises(
         MeasurementError, match=r"Cycles could not render .* no such device\. Check"
     ):
@@ -119,7 +120,7 @@ def test_a_child_that_dies_becomes_a_sentence(
 ) -> None:
     broken = tmp_path / "broken.py"
     broken.write_text("import os\nos._exit(7)\n")
-    monkeypatch.setattr(measuring, "WORKER", broken)
+    monkeypatch.setattr(process, "WORKER", broken)
     with pytest.raises(MeasurementError, match=r"ended early \(exit code 7\)"):
         measure(tiny, tmp_path / "cache")
 

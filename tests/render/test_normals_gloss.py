@@ -13,7 +13,7 @@ from tolerances import SHADER, WRITTEN
 
 from cdrf_addon import compat, ids
 from cdrf_addon.blender import state
-from cdrf_addon.blender.material import specular as gloss
+from cdrf_addon.blender.material import specular
 from cdrf_addon.core.reflectance.detail import detail_left
 from cdrf_addon.core.reflectance.model import PROFILE
 from cdrf_addon.core.reflectance.profile import profile
@@ -147,7 +147,7 @@ def test_gloss_comes_off_without_a_trace(rig: Rig) -> None:
     node.inputs["Metallic"].default_value = 0.25
     node.inputs["Coat Weight"].default_value = 0.5
     node.inputs["Alpha"].default_value = 0.9
-    assert not gloss.suits(material) or node.inputs["Coat Weight"].default_value
+    assert not specular.is_worth_keeping(material) or node.inputs["Coat Weight"].default_value
     node.inputs["Specular IOR Level"].default_value = 0.5
     before = describe(material)
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
@@ -157,7 +157,7 @@ def test_gloss_comes_off_without_a_trace(rig: Rig) -> None:
     assert len(copies) == 2  # the gloss and the metal
     assert all(copy.inputs["Roughness"].links[0].from_node == noise for copy in copies)
     material.cdrf.gloss = False
-    assert not gloss.has_gloss(material) and not material.cdrf.gloss
+    assert not specular.has_specular(material) and not material.cdrf.gloss
     material.cdrf.gloss = True
     node.inputs["Coat Weight"].default_value = 0.0
     reasons = state.reasons_to_update(ball, rig.scene, bpy.context.view_layer)
@@ -190,14 +190,14 @@ def test_undo_takes_back_world_and_gloss(rig: Rig) -> None:
     bpy.ops.ed.undo_push(message="setup")
     material().cdrf.gloss = False
     bpy.ops.ed.undo_push(message="no gloss")
-    assert not gloss.has_gloss(material())
+    assert not specular.has_specular(material())
     bpy.ops.ed.undo()
-    assert gloss.has_gloss(material())
+    assert specular.has_specular(material())
     bpy.ops.ed.undo()
     assert describe(material()) == before
     assert len(bpy.data.scenes) == 1 and len(bpy.data.worlds) == 1
     bpy.ops.ed.redo()
-    assert gloss.has_gloss(material())
+    assert specular.has_specular(material())
     item = bpy.data.objects["Ball"]
     assert not state.reasons_to_update(item, bpy.context.scene, bpy.context.view_layer)
 
@@ -206,17 +206,17 @@ def test_gloss_is_offered_where_there_is_some(rig: Rig) -> None:
     ball = rig.sphere()
     node = surface(ball)
     material = ball.data.materials[0]
-    assert not gloss.suits(material)
+    assert not specular.is_worth_keeping(material)
     node.inputs["Specular IOR Level"].default_value = 0.5
-    assert gloss.suits(material) and material.cdrf.gloss
+    assert specular.is_worth_keeping(material) and material.cdrf.gloss
     node.inputs["Metallic"].default_value = 1.0
-    assert not gloss.suits(material)
+    assert not specular.is_worth_keeping(material)
     node.inputs["Metallic"].default_value = 0.0
     material.cdrf.gloss = False
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
-    assert not gloss.has_gloss(material)
+    assert not specular.has_specular(material)
     assert bpy.ops.cdrf.update() == {"FINISHED"}
-    assert not gloss.has_gloss(material)
+    assert not specular.has_specular(material)
 
 
 @pytest.mark.smoke

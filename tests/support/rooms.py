@@ -63,7 +63,7 @@ ROOMS: dict[str, Room] = {
         (*BELOW, *SCENE, "blender/shader", "blender/material"),
     ),
     JOB: Room(
-        "the job of Set Up: selection, mesh by mesh, report, state; setup only orders them",
+        "Make Translucent: selection, mesh by mesh, report, state; setup only orders them. Its removal",
         (*BELOW, *BLENDER[:-1]),
     ),
     "measuring": Room(

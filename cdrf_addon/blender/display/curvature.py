@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curvature in colours in place of the skin (paper, Fig. 3a), and back again."""
+"""Curvature in colours in place of the translucent surface (paper, Fig. 3a), and back again."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import bpy
 
 from ... import ids
 from ...core.errors import SceneError
-from ..material.install import cdrf_node, skin_output, skin_socket
+from ..material.install import cdrf_node, cdrf_output, surface_socket
 from ..nodes.curvature import display_group
 from ..nodes.tree import TreeBuilder
 from ..shader.curvature import curvature_nodes, diffused_node, level_nodes, size_node
@@ -43,48 +43,48 @@ def _display_nodes(material: bpy.types.Material) -> list[bpy.types.ShaderNode]:
 
 
 def shows_curvature(material: bpy.types.Material) -> bool:
-    """Tell whether the material shows its curvature just now."""
+    """Return whether the material shows its curvature just now."""
     return bool(_display_nodes(material))
 
 
 def showing_materials() -> list[bpy.types.Material]:
     """List the materials of the file that show their curvature just now."""
-    return [item for item in bpy.data.materials if shows_curvature(item)]
+    return [one for one in bpy.data.materials if shows_curvature(one)]
 
 
 def value_range(meshes: Iterable[bpy.types.Mesh], quantity: str) -> tuple[float, float]:
-    """Values of the first and the last colour: 5th to 95th percentile, or +- the 95th."""
+    """Return the values of the first and last colour: 5th to 95th percentile, or +- the 95th."""
     known = [mesh.cdrf for mesh in meshes]
     if quantity in SIGNED_QUANTITIES:
-        high = max((item.mean_high for item in known), default=0.0) or 1.0
+        high = max((one.mean_high for one in known), default=0.0) or 1.0
         return -high, high
-    low = min((item.low for item in known), default=0.0)
-    high = max((item.high for item in known), default=1.0)
+    low = min((one.low for one in known), default=0.0)
+    high = max((one.high for one in known), default=1.0)
     # One curvature everywhere is shown in one colour, not divided by zero.
     return low, max(high, low * 1.001, 1e-6)
 
 
 def show(
     scene: bpy.types.Scene,
-    skins: dict[bpy.types.Material, list[bpy.types.Mesh]],
+    materials: dict[bpy.types.Material, list[bpy.types.Mesh]],
     quantity: str = "KAPPA",
 ) -> None:
     """Show the curvature of some materials' meshes, all on one scale, and keep the legend's data.
 
     Args:
         scene: Its view settings are kept for `hide`.
-        skins: The translucent materials, each with the meshes that show it.
+        materials: The translucent materials, each with the meshes that show it.
         quantity: A key of QUANTITIES.
 
     Raises:
         SceneError: None of the materials can show it.
     """
-    skins = {skin: meshes for skin, meshes in skins.items() if skin_output(skin) is not None}
-    if not skins:
+    materials = {one: meshes for one, meshes in materials.items() if cdrf_output(one) is not None}
+    if not materials:
         raise SceneError("The CDRF Material Output was deleted: press Update first.")
-    low, high = value_range({mesh for meshes in skins.values() for mesh in meshes}, quantity)
-    for material in skins:
-        show_skin(material)
+    low, high = value_range({mesh for meshes in materials.values() for mesh in meshes}, quantity)
+    for material in materials:
+        show_surface(material)
         _show_on(material, quantity, low, high)
     view = scene.view_settings
     kept = scene.get(ids.DISPLAY_KEY)
@@ -97,16 +97,16 @@ def show(
         _set(view, name, _PLAIN[name])
 
 
-def hide(skins: Iterable[bpy.types.Material]) -> None:
-    """Show the skins again, with the view settings there were, in every scene that showed them.
+def hide(materials: Iterable[bpy.types.Material]) -> None:
+    """Show the surfaces again, and in every scene without such colours its former view settings.
 
     A view setting that was changed meanwhile stays as it is.
     """
-    for material in skins:
-        show_skin(material)
+    for material in materials:
+        show_surface(material)
     for scene in bpy.data.scenes:
         kept = scene.get(ids.DISPLAY_KEY)
-        if kept is None or any(shows_curvature(skin) for skin in _materials_in(scene)):
+        if kept is None or any(map(shows_curvature, _materials_in(scene))):
             continue
         view = scene.view_settings
         for name, value in kept["before"].to_dict().items():
@@ -125,37 +125,39 @@ def _set(view: bpy.types.ColorManagedViewSettings, name: str, value: Any) -> Non
 
 
 def _materials_in(scene: bpy.types.Scene) -> set[bpy.types.Material]:
-    slots = (slot for item in scene.objects for slot in item.material_slots)
+    slots = (slot for obj in scene.objects for slot in obj.material_slots)
     return {slot.material for slot in slots if cdrf_node(slot.material) is not None}
 
 
-def refresh(scene: bpy.types.Scene, skins: dict[bpy.types.Material, list[bpy.types.Mesh]]) -> None:
+def refresh(
+    scene: bpy.types.Scene, materials: dict[bpy.types.Material, list[bpy.types.Mesh]]
+) -> None:
     """Bring the materials that show curvature up to date with new curvature and node groups."""
     kept = scene.get(ids.DISPLAY_KEY)
-    if kept is not None and any(shows_curvature(skin) for skin in skins):
-        show(scene, skins, kept["quantity"])
+    if kept is not None and any(map(shows_curvature, materials)):
+        show(scene, materials, kept["quantity"])
 
 
-def show_skin(material: bpy.types.Material) -> None:
-    """Take the display's nodes out of a material and connect the skin again."""
+def show_surface(material: bpy.types.Material) -> None:
+    """Remove the display's nodes from a material and connect the translucent surface again."""
     if cdrf_node(material) is None or not shows_curvature(material):
         return
     tree = material.node_tree
     for node in _display_nodes(material):
         tree.nodes.remove(node)
-    output = skin_output(material)
+    output = cdrf_output(material)
     if output is not None:
-        tree.links.new(skin_socket(material), output.inputs["Surface"])
+        tree.links.new(surface_socket(material), output.inputs["Surface"])
 
 
 def _show_on(material: bpy.types.Material, quantity: str, low: float, high: float) -> None:
     node = cdrf_node(material)
-    output = skin_output(material)
+    output = cdrf_output(material)
     if node is None or output is None:
         return
     tree = material.node_tree
     builder = TreeBuilder(tree)
-    before = {item.name for item in tree.nodes}
+    before = {each.name for each in tree.nodes}
     filled = builder.node("ShaderNodeAttribute", attribute_name=ids.FILLED_ATTRIBUTE)
     shown = builder.group(
         display_group(signed=quantity in SIGNED_QUANTITIES),
@@ -165,10 +167,10 @@ def _show_on(material: bpy.types.Material, quantity: str, low: float, high: floa
         Maximum=high,
         Mark=filled.outputs["Fac"],
     )
-    added = [item for item in tree.nodes if item.name not in before]
-    for column, item in enumerate(added):
-        item[ids.ROLE_KEY] = ids.ROLE_DISPLAY_PART
-        item.location = (node.location[0] - 600.0 + 190.0 * column, node.location[1] + 260.0)
+    added = [each for each in tree.nodes if each.name not in before]
+    for column, part in enumerate(added):
+        part[ids.ROLE_KEY] = ids.ROLE_DISPLAY_PART
+        part.location = (node.location[0] - 600.0 + 190.0 * column, node.location[1] + 260.0)
     builder.feed(output.inputs["Surface"], shown.outputs[ids.SHADER])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-# EEVEE in the viewport whatever the render engine is.
+# Shown by EEVEE, whatever the render engine is.
 _SHOWS_MATERIALS = "MATERIAL"
 _before: dict[int, str] = {}
 """Former shading of the views that were changed, by address of their space."""
@@ -17,7 +17,7 @@ def _spaces(context: bpy.types.Context) -> list[bpy.types.SpaceView3D]:
 
 
 def show_materials(context: bpy.types.Context) -> None:
-    """Let the window's 3D Views show materials; those that do already stay as they are."""
+    """Switch the window's 3D Views to show materials; those that do already stay as they are."""
     for space in _spaces(context):
         if space.shading.type in {"SOLID", "WIREFRAME"}:
             _before[space.as_pointer()] = space.shading.type

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials: CDRF in and out of a node tree, leaving the artist's own nodes as they were.
+"""CDRF in and out of a material's node tree; the artist's own nodes stay as they were.
 
 The translucent surface gets a Material Output of its own whose target is EEVEE. The artist's nodes
-and output stay, so Cycles renders them as before, and removing our two nodes restores everything.
+and output stay, so Cycles renders them as before, and removing our nodes restores everything.
 """
 
 from __future__ import annotations
@@ -33,19 +33,11 @@ def cdrf_node(material: bpy.types.Material | None) -> bpy.types.ShaderNode | Non
     return None
 
 
-def active_skin(item: bpy.types.Object | None) -> bpy.types.Material | None:
-    """Return the translucent material that panels show: the active slot's, or the first."""
-    if item is None or item.type != "MESH":
-        return None
-    skins = [slot.material for slot in item.material_slots if cdrf_node(slot.material)]
-    return item.active_material if item.active_material in skins else next(iter(skins), None)
-
-
 def require_editable(data: bpy.types.ID) -> None:
     """Refuse data that cannot be changed in this file.
 
     Raises:
-        SceneError: The data is linked; the text says from where and what to do.
+        SceneError: The data is linked; the message names the file and what to do.
     """
     if not data.is_editable:
         where = data.library.filepath if data.library else "another file"
@@ -57,11 +49,11 @@ def require_editable(data: bpy.types.ID) -> None:
 
 @dataclass(frozen=True)
 class SurfaceSource:
-    """What the artist's present surface is fed with: sockets where linked, else plain values."""
+    """Inputs of the artist's present surface: sockets where linked, else plain values."""
 
     colour: Any
     normal: Any = None
-    """A socket, or None for the geometry's own."""
+    """A socket, or None for the geometry's own normal."""
     alpha: Any = 1.0
 
 
@@ -83,53 +75,53 @@ def find_surface_source(material: bpy.types.Material) -> SurfaceSource:
         for name in COLOUR_INPUTS:
             if name in node.inputs and node.type != "EMISSION":
                 return SurfaceSource(
-                    _fed(node, name), _link(node, "Normal"), _fed(node, "Alpha", 1.0)
+                    _input_of(node, name), _source_of(node, "Normal"), _input_of(node, "Alpha", 1.0)
                 )
-        pending += [item for item in node.inputs if item.type == "SHADER"]
+        pending += [one for one in node.inputs if one.type == "SHADER"]
     return SurfaceSource(tuple(material.diffuse_color))
 
 
 def is_mapped(material: bpy.types.Material) -> bool:
-    """Tell whether a normal or bump map feeds the skin, or will once it is translucent."""
+    """Return whether a normal or bump map feeds the surface, or will once it is translucent."""
     node = cdrf_node(material)
     if node is not None:
         return bool(node.inputs[ids.NORMAL].is_linked)
     return find_surface_source(material).normal is not None
 
 
-def _link(node: bpy.types.ShaderNode, name: str) -> Any:
+def _source_of(node: bpy.types.ShaderNode, name: str) -> Any:
     socket = node.inputs.get(name)
     return socket.links[0].from_socket if socket is not None and socket.is_linked else None
 
 
-def _fed(node: bpy.types.ShaderNode, name: str, default: Any = None) -> Any:
+def _input_of(node: bpy.types.ShaderNode, name: str, default: Any = None) -> Any:
     if name not in node.inputs:
         return default
     value = node.inputs[name].default_value
-    return _link(node, name) or (value if isinstance(value, float) else tuple(value))
+    return _source_of(node, name) or (value if isinstance(value, float) else tuple(value))
 
 
 def own_node(tree: bpy.types.ShaderNodeTree | None, role: str) -> bpy.types.ShaderNode | None:
-    """Find a node that we put into a material, whatever its name by now."""
+    """Find a node that we put into a material, whatever its present name."""
     nodes = tree.nodes if tree else ()
     return next((node for node in nodes if node.get(ids.ROLE_KEY) == role), None)
 
 
-def skin_output(material: bpy.types.Material) -> bpy.types.ShaderNode | None:
-    """Return the material's CDRF output, or None if it has none (any more)."""
+def cdrf_output(material: bpy.types.Material) -> bpy.types.ShaderNode | None:
+    """Return the material's CDRF Material Output, or None if it has none (any more)."""
     return own_node(material.node_tree, ids.ROLE_OUTPUT)
 
 
-def skin_socket(material: bpy.types.Material) -> bpy.types.NodeSocket:
-    """Return the socket that carries the translucent surface, its transparency included."""
+def surface_socket(material: bpy.types.Material) -> bpy.types.NodeSocket:
+    """Return the socket of the whole translucent surface, its transparency included."""
     mix = own_node(material.node_tree, ids.ROLE_ALPHA)
     if mix is not None:
         return mix.outputs["Shader"]
-    return core_socket(material)
+    return socket_before_alpha(material)
 
 
-def core_socket(material: bpy.types.Material) -> bpy.types.NodeSocket:
-    """Return the socket that carries the translucent surface with its gloss, but not its alpha."""
+def socket_before_alpha(material: bpy.types.Material) -> bpy.types.NodeSocket:
+    """Return the socket of the translucent surface with its specular half, before its alpha."""
     end = own_node(material.node_tree, ids.ROLE_GLOSS_END)
     if end is not None:
         return end.outputs["Shader"]
@@ -162,15 +154,15 @@ def install(material: bpy.types.Material, group: bpy.types.ShaderNodeTree) -> bp
             _add_alpha(builder, node, source.alpha)
     elif node.node_tree != group:
         _swap(material.node_tree, node, group)
-    if skin_output(material) is None:
+    if cdrf_output(material) is None:
         _add_output(material, node)
     _link_thickness(material, node)
     return node
 
 
 def _link_thickness(material: bpy.types.Material, node: bpy.types.ShaderNode) -> None:
-    """Tell EEVEE how deep the surface's own shadow is skipped, unless the artist says otherwise."""
-    output = skin_output(material)
+    """Link the depth to which EEVEE skips the surface's own shadow, unless the artist links one."""
+    output = cdrf_output(material)
     if output is None or ids.THICKNESS not in node.outputs:
         return
     socket = output.inputs.get("Thickness")
@@ -179,7 +171,7 @@ def _link_thickness(material: bpy.types.Material, node: bpy.types.ShaderNode) ->
 
 
 def _add_alpha(builder: TreeBuilder, node: bpy.types.ShaderNode, alpha: Any) -> None:
-    """Let the surface be as transparent as the artist's: alpha mixes it with Transparent."""
+    """Make the surface as transparent as the artist's: alpha mixes it with Transparent."""
     clear = builder.node("ShaderNodeBsdfTransparent")
     clear[ids.ROLE_KEY] = ids.ROLE_TRANSPARENT
     mix = builder.node("ShaderNodeMixShader")
@@ -199,7 +191,7 @@ def _add_output(material: bpy.types.Material, node: bpy.types.ShaderNode) -> Non
     output = TreeBuilder(tree).node("ShaderNodeOutputMaterial", ids.OUTPUT_NODE, target="EEVEE")
     output[ids.ROLE_KEY] = ids.ROLE_OUTPUT
     output.location = (node.location[0] + 420.0, node.location[1])
-    tree.links.new(skin_socket(material), output.inputs["Surface"])
+    tree.links.new(surface_socket(material), output.inputs["Surface"])
     if former is not None:
         # Displacement and thickness go on as they were; only the surface is replaced.
         for socket in former.inputs:
@@ -233,7 +225,7 @@ def _swap(
 
 
 def remove(material: bpy.types.Material) -> bool:
-    """Take CDRF out of a material again; tell whether there was any."""
+    """Remove CDRF from a material; return whether there was any."""
     node = cdrf_node(material)
     if node is None:
         return False

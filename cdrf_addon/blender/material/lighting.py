@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lights of a skin, which several view layers, or another scene, may see as well.
+"""The lights of translucent materials, which several view layers or scenes may show.
 
-A render draws every view layer of a scene with the same material, so the skin's group holds the
+A render draws every view layer of a scene with the same material, so the material's group holds the
 lights of all layers that show it. A light that one of them leaves out is switched by a driver that
 reads the *Exclude* flags of the view layer being drawn.
 """
@@ -22,38 +22,38 @@ from .install import cdrf_node
 
 def _shows(
     view_layer: bpy.types.ViewLayer,
-    skins: set[bpy.types.Material],
+    materials: set[bpy.types.Material],
     fresh: set[bpy.types.Object],
 ) -> bool:
-    """Tell whether anything in a view layer is translucent, or about to be."""
+    """Return whether anything in a view layer is translucent, or about to be."""
     return any(
-        item in fresh or any(slot.material in skins for slot in item.material_slots)
-        for item in shown_objects(view_layer)
-        if item.type == "MESH"
+        obj in fresh or any(slot.material in materials for slot in obj.material_slots)
+        for obj in shown_objects(view_layer)
+        if obj.type == "MESH"
     )
 
 
-def lights_on_skin(
+def lights_of_translucent(
     scene: bpy.types.Scene,
     view_layer: bpy.types.ViewLayer,
     fresh: Iterable[bpy.types.Object] = (),
 ) -> list[SceneLight]:
-    """List the lights that reach the skin in any rendered view layer of a scene, by name.
+    """List the lights of any rendered view layer that shows something translucent, by name.
 
     Args:
         scene: The scene.
-        view_layer: Counts whether or not it is rendered; alone if no layer shows any skin.
+        view_layer: Counts whether or not it is rendered; alone if nothing is translucent yet.
         fresh: Objects that are about to become translucent.
     """
     layers, others = [view_layer], [one for one in scene.view_layers if one != view_layer]
     if others:  # asked at every redraw of the panel, so not without need
-        skins = {skin for skin in bpy.data.materials if cdrf_node(skin) is not None}
-        seen = [
+        materials = {one for one in bpy.data.materials if cdrf_node(one) is not None}
+        showing = [
             one
             for one in (view_layer, *others)
-            if (one.use or one == view_layer) and _shows(one, skins, set(fresh))
+            if (one.use or one == view_layer) and _shows(one, materials, set(fresh))
         ]
-        layers = seen or layers
+        layers = showing or layers
     found: dict[Source, SceneLight] = {}
     everywhere: set[Source] = set()
     for number, layer in enumerate(layers):
@@ -68,14 +68,14 @@ def lights_on_skin(
 
 
 def _flags_of(scene: bpy.types.Scene, light: SceneLight) -> tuple[str, ...]:
-    """Paths from a view layer to the Exclude flags of the collections that show a light."""
-    item = light.instance or light.object
+    """Return the paths from a view layer to the Exclude flags of the collections with a light."""
+    obj = light.instance or light.object
     flags: list[str] = []
 
     def visit(layer: bpy.types.LayerCollection, path: str) -> None:
         for child in layer.children:
             inside = f'{path}.children["{bpy.utils.escape_identifier(child.name)}"]'
-            if any(part == item for part in child.collection.objects):
+            if any(part == obj for part in child.collection.objects):
                 flags.append(f"{inside}.exclude")
             visit(child, inside)
 
@@ -99,5 +99,5 @@ def lit_elsewhere(material: bpy.types.Material, scene: bpy.types.Scene) -> bpy.t
     other = _home_of(node.node_tree) if node is not None else None
     if other is None or other == scene:
         return None
-    seen = any(slot.material == material for item in other.objects for slot in item.material_slots)
+    seen = any(slot.material == material for obj in other.objects for slot in obj.material_slots)
     return other if seen else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a material already says of its subsurface scattering: a Principled or Subsurface node.
+"""Subsurface scattering as a material's Principled or Subsurface Scattering node describes it.
 
 Blender has no shader that scatters differently over a surface in our sense, so an albedo that comes
 from a picture is read as the picture's mean.
@@ -15,9 +15,10 @@ import numpy as np
 
 from ... import ids
 from ...compat import uses_nodes
+from ..pictures import linear_from_srgb, pixels_of
 
 Colour = tuple[float, float, float]
-# Pixels of a picture that are looked at for its mean.
+# Pixels of a picture that make up its mean.
 MOST_PIXELS = 250_000
 # How Blender makes one number of a colour (Rec. 709).
 LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -35,14 +36,14 @@ class Scattering:
     weight: float
     """Part of the surface that scatters; 1 for a Subsurface Scattering node."""
     notes: tuple[str, ...] = ()
-    """What could not be read as it is, a sentence each."""
+    """What could not be read as it is; a sentence each, for the artist."""
 
 
 def read_scattering(material: bpy.types.Material) -> Scattering | None:
     """Read the scattering of the material's own surface; None if nothing in it scatters.
 
-    The first node counts that feeds the material's output, through mixes and node groups; our own
-    nodes are left aside.
+    The first such node that feeds the material's output counts, through mixes and node groups; our
+    own nodes do not.
     """
     if not uses_nodes(material):
         return None
@@ -67,7 +68,7 @@ def read_scattering(material: bpy.types.Material) -> Scattering | None:
 
 
 def _shaders_of(source: bpy.types.NodeSocket) -> list[bpy.types.NodeSocket]:
-    """Inputs through which shaders reach an output: of a mix those that show, of a group inside."""
+    """Return the inputs that feed a shader output: of a mix those that show, of a group inside."""
     node = source.node
     if node.type == "GROUP" and node.node_tree is not None:
         return [
@@ -130,7 +131,7 @@ def _vector(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> Colour:
 
 
 def _value(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> list[float]:
-    """Read an input, through plain value nodes and reroutes; a texture leaves the socket's own."""
+    """Read an input through value nodes and reroutes; with a texture, the socket's own value."""
     socket = node.inputs[name]
     source = _source(socket)
     if source is not None:
@@ -163,21 +164,19 @@ def _source(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
 
 
 def _plain(socket: bpy.types.NodeSocket) -> list[float]:
-    """Value of a socket: one number, or the three of a vector or colour."""
+    """Return the value of a socket: one number, or the three of a vector or colour."""
     value: Any = socket.default_value
     return [float(value)] if isinstance(value, float | int) else [float(v) for v in value][:3]
 
 
 def _mean(image: bpy.types.Image | None) -> Colour | None:
-    """Mean colour of a picture, linear; None if it cannot be read."""
+    """Return the mean colour of a picture, linear; None if it cannot be read."""
     if image is None or (not image.has_data and image.source not in {"FILE", "GENERATED"}):
         return None
     width, height = image.size
     if not width * height or not image.channels >= 3:
         return None
-    flat = np.empty(width * height * image.channels, dtype=np.float32)
-    image.pixels.foreach_get(flat)
-    pixels = flat.reshape(-1, image.channels)
+    pixels = pixels_of(image).reshape(-1, image.channels)
     pixels = pixels[:: max(1, len(pixels) // MOST_PIXELS)]
     solid = pixels[:, 3] > 0.0 if image.channels > 3 else np.ones(len(pixels), dtype=bool)
     with np.errstate(over="ignore"):
@@ -186,6 +185,6 @@ def _mean(image: bpy.types.Image | None) -> Colour | None:
         return None
     # Pixels come as they are stored: 8-bit pictures are display-referred.
     if image.colorspace_settings.name == "sRGB":
-        values = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+        values = linear_from_srgb(values)
     red, green, blue = values.mean(axis=0)
     return float(red), float(green), float(blue)

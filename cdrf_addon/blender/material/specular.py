@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gloss: the specular half of the artist's Principled BSDF on top of the translucent surface.
+"""The specular half of the artist's Principled BSDF on top of the translucent surface.
 
 A copy of the node without its diffuse half is added to CDRF, so that lights, world and reflections
 are Blender's own and nothing is lit twice:
 
-    CDRF x what the gloss lets through --+
-    copy: black, not metallic -----------+-> Add --+
-    copy: metallic 1 (only where it is metallic) --+-> Mix by Metallic -> alpha, output
+    CDRF x what the specular half lets through --+
+    copy: black, not metallic -------------------+-> Add --+
+    copy: metallic 1 (only where it is metallic) ----------+-> Mix by Metallic -> alpha, output
 
-The artist's node stays as it is; removing ours restores the material.
+The artist's node stays as it is; removing ours restores the material. Artists know this as gloss.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from ... import ids
 from ...compat import uses_nodes
 from ...core.reflectance.specular import BIAS, FADE, SCALE
 from ..nodes.tree import TreeBuilder, declare, ensure_group
-from .install import cdrf_node, core_socket, own_node
+from .install import cdrf_node, own_node, socket_before_alpha
 
 VERSION = 1
 
 METALLIC, LEVEL = "Metallic", "Specular IOR Level"
-# What makes a Principled BSDF's other halves; alpha is mixed in behind the sum.
+# Inputs that would add the other halves of a Principled BSDF; alpha is mixed in behind the sum.
 WITHOUT: dict[str, Any] = {
     "Subsurface Weight": 0.0,
     "Transmission Weight": 0.0,
@@ -60,31 +60,31 @@ def find_principled(material: bpy.types.Material) -> bpy.types.ShaderNode | None
         seen.add(node.name)
         if node.type == "BSDF_PRINCIPLED" and not node.mute:
             return node
-        pending += [item for item in node.inputs if item.type in {"SHADER", "CUSTOM"}]
+        pending += [one for one in node.inputs if one.type in {"SHADER", "CUSTOM"}]
     return None
 
 
-def suits(material: bpy.types.Material) -> bool:
-    """Tell whether a material has gloss to keep: specular, and not all metal."""
+def is_worth_keeping(material: bpy.types.Material) -> bool:
+    """Return whether the artist's Principled BSDF is specular, and not all metal."""
     node = find_principled(material)
     if node is None:
         return False
     level, metallic = node.inputs[LEVEL], node.inputs[METALLIC]
-    glossy = any(
+    specular = any(
         socket.is_linked or socket.default_value > 0.0
         for socket in (level, node.inputs["Coat Weight"], node.inputs["Sheen Weight"])
     )
-    return glossy and (metallic.is_linked or metallic.default_value < 1.0)
+    return specular and (metallic.is_linked or metallic.default_value < 1.0)
 
 
-def has_gloss(material: bpy.types.Material) -> bool:
-    """Tell whether gloss was added to a translucent material."""
+def has_specular(material: bpy.types.Material) -> bool:
+    """Return whether the specular half was added to a translucent material."""
     return own_node(material.node_tree, ids.ROLE_GLOSS_END) is not None
 
 
-def is_due(material: bpy.types.Material) -> bool:
-    """Tell whether the gloss is no longer that of the artist's node."""
-    if not has_gloss(material):
+def is_outdated(material: bpy.types.Material) -> bool:
+    """Return whether the specular half is no longer that of the artist's node."""
+    if not has_specular(material):
         return False
     source = find_principled(material)
     copy = own_node(material.node_tree, ids.ROLE_GLOSS)
@@ -100,8 +100,9 @@ def is_due(material: bpy.types.Material) -> bool:
 
 
 def _mirrored(copy: bpy.types.ShaderNode, besides: dict[str, Any]) -> Iterator[str]:
+    """Yield the inputs of a copy that have what the artist's node has."""
     for socket in copy.inputs:
-        # The unused ones of a mode cannot be found by name either.
+        # Inputs that a mode does not use cannot be found by name.
         shown = socket.enabled and hasattr(socket, "default_value")
         if shown and socket.name not in {*WITHOUT, *besides}:
             yield socket.name
@@ -121,36 +122,36 @@ def _value(socket: bpy.types.NodeSocket) -> Any:
     return tuple(value) if hasattr(value, "__iter__") and not isinstance(value, str) else value
 
 
-def remove_gloss(material: bpy.types.Material) -> None:
-    """Take the gloss off again; the translucent surface stays."""
+def remove_specular(material: bpy.types.Material) -> None:
+    """Remove the specular half; the translucent surface stays."""
     node = cdrf_node(material)
     tree = material.node_tree
-    if node is None or not has_gloss(material):
+    if node is None or not has_specular(material):
         return
-    targets = [link.to_socket for link in core_socket(material).links]
-    for item in list(tree.nodes):
-        if item.get(ids.ROLE_KEY) in PARTS:
-            tree.nodes.remove(item)
+    targets = [link.to_socket for link in socket_before_alpha(material).links]
+    for part in list(tree.nodes):
+        if part.get(ids.ROLE_KEY) in PARTS:
+            tree.nodes.remove(part)
     for target in targets:
         tree.links.new(node.outputs[ids.SHADER], target)
 
 
-def add_gloss(material: bpy.types.Material) -> bool:
-    """Add the artist's gloss to a translucent material, or bring it up to date.
+def add_specular(material: bpy.types.Material) -> bool:
+    """Add the artist's specular half to a translucent material, or bring it up to date.
 
     Returns:
         False where there is no Principled BSDF to take it from.
     """
-    remove_gloss(material)
+    remove_specular(material)
     node, source = cdrf_node(material), find_principled(material)
     if node is None or source is None:
         return False
     tree = material.node_tree
     targets = [link.to_socket for link in node.outputs[ids.SHADER].links]
-    before = {item.name for item in tree.nodes}
+    before = {each.name for each in tree.nodes}
     b = TreeBuilder(tree)
-    gloss = _copy(b, source, BLACK)
-    end = _sum(b, node, source, gloss)
+    specular = _copy(b, source, BLACK)
+    end = _sum(b, node, source, specular)
     metallic = source.inputs[METALLIC]
     if metallic.is_linked or metallic.default_value > 0.0:
         metal = _copy(b, source, METAL)
@@ -159,10 +160,10 @@ def add_gloss(material: bpy.types.Material) -> bool:
         _feed_in_order(b, mix, part, end, metal.outputs["BSDF"])
         metal[ids.ROLE_KEY] = ids.ROLE_METAL
         end = mix.outputs["Shader"]
-    for item in tree.nodes:
-        if item.name not in before and ids.ROLE_KEY not in item:
-            item[ids.ROLE_KEY] = ids.ROLE_GLOSS_PART
-    gloss[ids.ROLE_KEY] = ids.ROLE_GLOSS
+    for each in tree.nodes:
+        if each.name not in before and ids.ROLE_KEY not in each:
+            each[ids.ROLE_KEY] = ids.ROLE_GLOSS_PART
+    specular[ids.ROLE_KEY] = ids.ROLE_GLOSS
     end.node[ids.ROLE_KEY] = ids.ROLE_GLOSS_END
     _place(tree, node, before)
     for target in targets:
@@ -193,9 +194,9 @@ def _sum(
     b: TreeBuilder,
     node: bpy.types.ShaderNode,
     source: bpy.types.ShaderNode,
-    gloss: bpy.types.ShaderNode,
+    specular: bpy.types.ShaderNode,
 ) -> bpy.types.NodeSocket:
-    """Scale CDRF by what the gloss lets through and add the gloss."""
+    """Scale CDRF by what the specular half lets through and add that half."""
 
     def given(name: str) -> Any:
         socket = source.inputs[name]
@@ -211,14 +212,14 @@ def _sum(
     scaled = b.node("ShaderNodeMixShader")
     _feed_in_order(b, scaled, through, None, node.outputs[ids.SHADER])
     total = b.node("ShaderNodeAddShader")
-    _feed_in_order(b, total, scaled.outputs["Shader"], gloss.outputs["BSDF"])
+    _feed_in_order(b, total, scaled.outputs["Shader"], specular.outputs["BSDF"])
     return total.outputs["Shader"]
 
 
 def _through(
     b: TreeBuilder, normal: Any, roughness: Any, ior: Any, level: Any, weight: Any
 ) -> bpy.types.NodeSocket:
-    group = b.node("ShaderNodeGroup", node_tree=under_gloss_group())
+    group = b.node("ShaderNodeGroup", node_tree=under_specular_group())
     if isinstance(normal, bpy.types.NodeSocket):
         b.feed(group.inputs[ids.NORMAL], normal)
     for name, value in (
@@ -240,13 +241,16 @@ def _feed_in_order(b: TreeBuilder, node: bpy.types.ShaderNode, *operands: Any) -
 
 def _place(tree: bpy.types.ShaderNodeTree, node: bpy.types.ShaderNode, before: set[str]) -> None:
     x, y = node.location
-    for row, item in enumerate(item for item in tree.nodes if item.name not in before):
-        item.location = (x + 60.0 * row, y + 240.0 + 90.0 * row)
-        item.hide = True
+    for row, added in enumerate(each for each in tree.nodes if each.name not in before):
+        added.location = (x + 60.0 * row, y + 240.0 + 90.0 * row)
+        added.hide = True
 
 
-def under_gloss_group() -> bpy.types.ShaderNodeTree:
-    """Part of the light that gloss of a roughness and IOR lets through (core/gloss.py)."""
+def under_specular_group() -> bpy.types.ShaderNodeTree:
+    """Return the group: part of the light that passes a roughness and IOR.
+
+    The albedo of the specular half is the fit in core/reflectance/specular.py.
+    """
 
     def build(b: TreeBuilder) -> None:
         declare(b.tree, ids.NORMAL, "Vector", hide_value=True, tip="Unconnected, the surface's own")

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Evaluated meshes out of Blender, curvature attributes into it."""
+"""Curvature as attributes of a mesh: carried back through its modifiers, written and removed."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,173 +12,66 @@ import bpy
 import numpy as np
 
 from ... import ids
-from ...core.curvature.field import Options
+from ...core.curvature.scale_space import LEVELS
 from ...core.curvature.summary import VARYING
-from ...core.curvature.topology import edge_lengths
-from ...core.curvature.tri_mesh import TriMesh
-from ...core.errors import MeshError
+from .surface import positions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Bumped when the same mesh would give another curvature.
-ESTIMATOR_VERSION = 3
 ORIGIN_ATTRIBUTE = ".cdrf_origin"
 
 
 @dataclass(frozen=True)
-class Shape:
-    """What the curvature of an object depends on: its evaluated surface, in world units."""
+class VertexCurvature:
+    """Curvature at the vertices of a mesh as its attributes hold it; float32, n rows each."""
 
-    mesh: TriMesh
-    """Evaluated positions times the object's world scale, rotation and shear; not its location."""
-    fingerprint: str
-    """Hash of all of it; equal fingerprints have equal curvature."""
-    local_fingerprint: str
-    """Hash of the evaluated surface before the object's transform."""
-    metric: NDArray[np.float64]
-    """M^T M of the transform, (3, 3): equal for objects that differ by a rotation only."""
+    principal: NDArray[np.float32]
+    """(n, 4) kappa, k1, k2 and signed mean curvature, 1/unit."""
+    levels: NDArray[np.float32]
+    """(n, LEVELS) kappa at the diffusion lengths, 1/unit."""
+    shortest: NDArray[np.float32]
+    """(n,) the shortest of these lengths, in world units."""
+    filled: NDArray[np.float32]
+    """(n,) 1 where the neighbours' curvature stands in; a part of 1 where vertices were merged."""
 
-    def size_relative_to(self, other: Shape) -> float | None:
-        """Return how many times as large this is, or None if it is not the same shape scaled."""
-        factor = float(np.trace(self.metric) / np.trace(other.metric))
-        same = self.local_fingerprint == other.local_fingerprint and np.allclose(
-            self.metric, factor * other.metric, rtol=0.0, atol=1e-5 * np.trace(self.metric)
-        )
-        return factor**0.5 if same else None
+    @classmethod
+    def flat(cls, count: int) -> VertexCurvature:
+        """Return no curvature at that many vertices."""
+        return cls._of_columns(np.zeros((count, 4 + LEVELS + 2), dtype=np.float32))
 
+    @classmethod
+    def constant(cls, count: int, values: tuple[float, ...]) -> VertexCurvature:
+        """Return one curvature at that many vertices: kappa, k1, k2 and signed mean."""
+        principal = np.tile(np.array(values, dtype=np.float32), (count, 1))
+        levels = np.repeat(principal[:, :1], LEVELS, axis=1)
+        ones = np.ones(count, dtype=np.float32)
+        return cls(principal, levels, ones, np.zeros_like(ones))
 
-def linear_part(item: bpy.types.Object) -> NDArray[np.float64]:
-    """Scale, rotation and shear of an object, (3, 3)."""
-    return np.array(item.matrix_world, dtype=np.float64)[:3, :3]
+    @classmethod
+    def _of_columns(cls, columns: NDArray[np.float32]) -> VertexCurvature:
+        principal, levels, rest = np.split(columns, (4, 4 + LEVELS), axis=1)
+        return cls(principal, levels, rest[:, 0], rest[:, 1])
 
-
-def positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
-    """Vertex positions, (n, 3) float32, as Blender stores them."""
-    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    if len(flat):
-        mesh.attributes["position"].data.foreach_get("vector", flat)
-    return flat.reshape(-1, 3)
-
-
-def corner_vertices(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
-    """Vertex of each face corner: with the face sizes, the topology."""
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    if len(corners):
-        mesh.attributes[".corner_vert"].data.foreach_get("value", corners)
-    return corners
-
-
-def _triangles(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
-    """Vertices of the triangles that a mesh is drawn with, (3m,)."""
-    if len(mesh.loops) == 3 * len(mesh.polygons):
-        return corner_vertices(mesh)  # ten times as fast
-    mesh.calc_loop_triangles()
-    triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
-    return triangles
-
-
-def _digest(*parts: bytes) -> str:
-    digest = hashlib.blake2b(digest_size=16)
-    for part in parts:
-        digest.update(len(part).to_bytes(8, "little"))
-        digest.update(part)
-    return digest.hexdigest()
-
-
-def base_fingerprint(mesh: bpy.types.Mesh) -> str:
-    """Hash positions and topology of a mesh before modifiers."""
-    return _digest(positions(mesh).tobytes(), corner_vertices(mesh).tobytes())
-
-
-def read_shape(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: Options) -> Shape:
-    """Read an object's evaluated surface in world size.
-
-    Raises:
-        MeshError: It has no faces, or its scale is zero along an axis.
-    """
-    linear = linear_part(item)
-    size = float(np.linalg.norm(linear))
-    if not (np.isfinite(size) and abs(np.linalg.det(linear)) > 1e-12 * size**3 > 0.0):
-        raise MeshError(
-            f"'{item.name}' has a scale of zero along an axis; give it a size (N panel > Scale)."
-        )
-    evaluated = item.evaluated_get(depsgraph)
-    if not evaluated.is_evaluated:
-        raise MeshError(f"'{item.name}' is hidden with its collection: show that and try again.")
-    mesh = evaluated.to_mesh()
-    try:
-        if mesh is None or not len(mesh.polygons):
-            raise MeshError(
-                f"'{item.name}' has no faces to shade"
-                + (" after its modifiers." if len(item.data.polygons) else "; add some first.")
-            )
-        local, triangles = positions(mesh), _triangles(mesh)
-    finally:
-        evaluated.to_mesh_clear()
-    local_fingerprint = _digest(local.tobytes(), triangles.tobytes())
-    faces = triangles.reshape(-1, 3)
-    if np.linalg.det(linear) < 0.0:
-        faces = faces[:, ::-1]  # a mirrored object keeps its outside
-    metric = linear.T @ linear
-    # Rounded, so that turning an object, which changes the last digits, recomputes nothing.
-    rounded = np.round(metric / np.trace(metric), 6) + 0.0
-    square = float(f"{np.trace(metric):.6g}")
-    fingerprint = _digest(
-        local_fingerprint.encode(),
-        rounded.tobytes(),
-        repr((square, options.method, options.radius, ESTIMATOR_VERSION)).encode(),
-        f"{options.crease_angle:.5g}".encode(),
-    )
-    with np.errstate(invalid="ignore", over="ignore"):
-        world = local.astype(np.float64) @ linear.T
-    return Shape(TriMesh.from_arrays(world, faces), fingerprint, local_fingerprint, metric)
-
-
-@contextmanager
-def evaluable(
-    items: Iterable[bpy.types.Object],
-    view_layer: bpy.types.ViewLayer,
-    depsgraph: bpy.types.Depsgraph,
-) -> Iterator[None]:
-    """Show hidden objects inside the `with` block: Blender does not evaluate what it hides."""
-    hidden = [
-        (item, item.hide_viewport, item.hide_get(view_layer=view_layer))
-        for item in items
-        if item.hide_viewport or item.hide_get(view_layer=view_layer)
-    ]
-    for item, *_ in hidden:
-        item.hide_viewport = False
-        item.hide_set(False, view_layer=view_layer)
-    try:
-        if hidden:
-            depsgraph.update()
-        yield
-    finally:
-        for item, everywhere, here in hidden:
-            item.hide_set(here, view_layer=view_layer)
-            item.hide_viewport = everywhere
-
-
-def coordinate_noise(mesh: TriMesh) -> float:
-    """Curvature that the rounding of float32 positions alone may feign: rounding / edge^2."""
-    some = mesh.triangles[:: max(1, len(mesh.triangles) // 10_000)]
-    largest = float(np.median(np.abs(mesh.vertices[some[:, 0]]).max(axis=1)))
-    edge = float(np.median(edge_lengths(mesh.vertices, some)))
-    return largest * float(np.finfo(np.float32).eps) / edge**2 if edge > 0.0 else 0.0
+    def on_original_vertices(
+        self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+    ) -> tuple[VertexCurvature, int]:
+        """Carry it from an object's evaluated vertices to its own; see `to_original_vertices`."""
+        columns = np.column_stack((self.principal, self.levels, self.shortest, self.filled))
+        carried, lost = to_original_vertices(obj, depsgraph, columns)
+        return self._of_columns(carried), lost
 
 
 @contextmanager
 def evaluated_origins(
-    item: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> Iterator[NDArray[np.int64]]:
-    """Tell for each evaluated vertex which original vertex it is, -1 where it is a new one.
+    """Yield for each evaluated vertex which original vertex it is, -1 where it is a new one.
 
     Modifiers blend attributes, so a vertex is an original one where all of a random code arrives
     unblended. The code lies on the mesh only inside the `with` block.
     """
-    mesh = item.data
+    mesh = obj.data
     count = len(mesh.vertices)
     code = np.random.default_rng(20111106).random((count, 3), dtype=np.float32)
     attribute = mesh.attributes.new(ORIGIN_ATTRIBUTE, "FLOAT_VECTOR", "POINT")
@@ -188,7 +80,7 @@ def evaluated_origins(
         attribute.data.foreach_set("vector", code.ravel())
         mesh.update_tag()
         depsgraph.update()
-        evaluated = item.evaluated_get(depsgraph)
+        evaluated = obj.evaluated_get(depsgraph)
         result = evaluated.to_mesh()
         try:
             arrived = np.zeros((len(result.vertices), 3), dtype=np.float32)
@@ -210,7 +102,7 @@ def evaluated_origins(
 
 
 def to_original_vertices(
-    item: bpy.types.Object,
+    obj: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     values: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], int]:
@@ -221,18 +113,18 @@ def to_original_vertices(
     did not survive take the value of the nearest evaluated vertex.
 
     Args:
-        item: The object.
+        obj: A mesh object.
         depsgraph: Its dependency graph.
         values: (number of evaluated vertices, k).
 
     Returns:
         (number of original vertices, k), and how many had to take the nearest.
     """
-    mesh = item.data
+    mesh = obj.data
     count = len(mesh.vertices)
-    if not item.modifiers or _only_deforms(item, len(values)):
+    if not obj.modifiers or _only_deforms(obj, len(values)):
         return values, 0
-    with evaluated_origins(item, depsgraph) as origin:
+    with evaluated_origins(obj, depsgraph) as origin:
         known = origin >= 0
         total = np.bincount(origin[known], minlength=count)
         carried = np.stack(
@@ -243,7 +135,7 @@ def to_original_vertices(
     if len(lost):
         from scipy.spatial import cKDTree
 
-        evaluated = item.evaluated_get(depsgraph)
+        evaluated = obj.evaluated_get(depsgraph)
         shape = evaluated.to_mesh()
         try:
             where = positions(shape)
@@ -263,37 +155,26 @@ DEFORMING = {
 }
 
 
-def _only_deforms(item: bpy.types.Object, evaluated_count: int) -> bool:
-    return evaluated_count == len(item.data.vertices) and all(
-        modifier.type in DEFORMING or not modifier.show_viewport for modifier in item.modifiers
+def _only_deforms(obj: bpy.types.Object, evaluated_count: int) -> bool:
+    return evaluated_count == len(obj.data.vertices) and all(
+        modifier.type in DEFORMING or not modifier.show_viewport for modifier in obj.modifiers
     )
 
 
 _COLOURS = (ids.CURVATURE_ATTRIBUTE, ids.DIFFUSED_ATTRIBUTE)
 
 
-def write_curvature(
-    mesh: bpy.types.Mesh,
-    principal: NDArray[np.float32],
-    levels: NDArray[np.float32],
-    finest: NDArray[np.float32],
-) -> None:
-    """Store a mesh's curvature.
-
-    Args:
-        mesh: The mesh.
-        principal: (n, 4) kappa, k1, k2, signed mean.
-        levels: (n, 4) kappa at four diffusion lengths.
-        finest: (n,) the shortest of those lengths, in world units.
-    """
-    _write_colours(mesh, ids.CURVATURE_ATTRIBUTE, principal)
-    _write_colours(mesh, ids.DIFFUSED_ATTRIBUTE, levels)
-    _write_floats(mesh, ids.LENGTH_ATTRIBUTE, finest)
+def write_curvature(mesh: bpy.types.Mesh, curvature: VertexCurvature) -> None:
+    """Store a mesh's curvature, without the marks of `mark_filled`."""
+    _write_colours(mesh, ids.CURVATURE_ATTRIBUTE, curvature.principal)
+    _write_colours(mesh, ids.DIFFUSED_ATTRIBUTE, curvature.levels)
+    _write_floats(mesh, ids.LENGTH_ATTRIBUTE, curvature.shortest)
     mesh.update_tag()
 
 
-def mark_filled(mesh: bpy.types.Mesh, filled: NDArray[np.bool_]) -> None:
+def mark_filled(mesh: bpy.types.Mesh, curvature: VertexCurvature) -> None:
     """Mark the vertices whose curvature comes from their neighbours; no mark, no attribute."""
+    filled = curvature.filled > 0.5
     if filled.any():
         _write_floats(mesh, ids.FILLED_ATTRIBUTE, filled.astype(np.float32))
     elif ids.FILLED_ATTRIBUTE in mesh.attributes:
@@ -324,7 +205,7 @@ def _write_colours(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32])
 
 
 def remove_curvature(mesh: bpy.types.Mesh) -> None:
-    """Take the attributes off a mesh that does not need them."""
+    """Remove the attributes from a mesh that does not need them."""
     for name in (*_COLOURS, ids.LENGTH_ATTRIBUTE, ids.FILLED_ATTRIBUTE):
         attribute = mesh.attributes.get(name)
         if attribute is not None:
@@ -333,14 +214,14 @@ def remove_curvature(mesh: bpy.types.Mesh) -> None:
 
 
 def has_curvature(mesh: bpy.types.Mesh) -> bool:
-    """Tell whether a mesh carries the attributes in the form the shader reads."""
+    """Return whether a mesh carries the attributes in the form the shader reads."""
     return _holds(mesh, ids.LENGTH_ATTRIBUTE, "FLOAT") and all(
         _holds(mesh, name, "FLOAT_COLOR") for name in _COLOURS
     )
 
 
 def is_measured(mesh: bpy.types.Mesh) -> bool:
-    """Tell whether a mesh carries what was measured of it."""
+    """Return whether a mesh carries what was measured of it."""
     known = mesh.cdrf
     return bool(known.fingerprint) and (known.kind != VARYING or has_curvature(mesh))
 

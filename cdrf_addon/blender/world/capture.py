@@ -23,6 +23,7 @@ import numpy as np
 from ...compat import set_equirectangular, set_still_format
 from ...core.errors import SceneError
 from ...core.reflectance.environment import Environment, project, reduce_picture
+from ..pictures import pixels_of, read_picture
 
 WIDTH, HEIGHT = 256, 128
 SAMPLES = 8
@@ -128,9 +129,7 @@ def _reduced(image: bpy.types.Image | None) -> bpy.types.Image | None:
         return None
     if not image.is_float and space != "sRGB":
         return None
-    flat = np.empty(width * height * image.channels, dtype=np.float32)
-    image.pixels.foreach_get(flat)
-    pixels = np.nan_to_num(flat.reshape(height, width, image.channels)[..., :3], posinf=65504.0)
+    pixels = np.nan_to_num(pixels_of(image)[..., :3], posinf=65504.0)
     if not image.is_float:
         pixels = np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
     rows = min(height, PICTURE_WIDTH // 2)
@@ -201,10 +200,4 @@ def _render(scene: bpy.types.Scene) -> np.ndarray:
             ) from error
         if not path.exists():
             raise SceneError("The world's light could not be rendered: Update to try again.")
-        image = bpy.data.images.load(str(path))
-        flat = np.empty(len(image.pixels), dtype=np.float32)
-        image.pixels.foreach_get(flat)
-        width, height = image.size
-        channels = image.channels
-        bpy.data.images.remove(image)
-    return np.asarray(flat.reshape(height, width, channels)[..., :3], dtype=np.float64)
+        return read_picture(path)[..., :3].astype(np.float64)

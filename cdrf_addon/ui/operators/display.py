@@ -9,13 +9,12 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ... import ids
-from ...blender.display import curvature as display
-from ...blender.display import legend, viewport
-from ...blender.setup import skins_of
+from ...blender.display import curvature, legend, viewport
+from ...blender.material.translucent import translucent_materials_of
 from ...core.errors import CdrfError, SceneError
 from .shared import any_translucent, refuse
 
-QUANTITY_ITEMS = [(key, *texts) for key, texts in display.QUANTITIES.items()]
+QUANTITY_ITEMS = [(key, *texts) for key, texts in curvature.QUANTITIES.items()]
 
 
 class CDRF_OT_show_curvature(bpy.types.Operator):
@@ -49,14 +48,14 @@ class CDRF_OT_show_curvature(bpy.types.Operator):
         return ids.DISPLAY_KEY in context.scene or any_translucent(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        materials = skins_of(context.view_layer)
-        shown = ids.DISPLAY_KEY in context.scene or any(map(display.shows_curvature, materials))
+        materials = translucent_materials_of(context.view_layer)
+        shown = ids.DISPLAY_KEY in context.scene or any(map(curvature.shows_curvature, materials))
         if self.display == "OFF" or (self.display == "TOGGLE" and shown):
-            display.hide(display.showing_materials())
+            curvature.hide(curvature.showing_materials())
             viewport.restore(context)
             return {"FINISHED"}
         try:
-            display.show(context.scene, materials, self.quantity)
+            curvature.show(context.scene, materials, self.quantity)
         except CdrfError as error:
             return refuse(self, error)
         viewport.show_materials(context)
@@ -94,7 +93,7 @@ class CDRF_OT_save_curvature(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        materials = skins_of(context.view_layer)
+        materials = translucent_materials_of(context.view_layer)
         try:
             path = _png_path(self.filepath)
             legend.render_curvature(context.scene, materials, path, self.quantity)

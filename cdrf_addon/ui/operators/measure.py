@@ -19,8 +19,9 @@ import numpy as np
 from bpy.props import EnumProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ... import ids
-from ...blender.material import model as reflectance_models
 from ...blender.material.install import cdrf_node
+from ...blender.material.model import has_colour, kind_of_model, set_kind, set_model
+from ...blender.material.scatter_distance import channel_sigma0, set_channel_sigma0
 from ...blender.material.scattering import Scattering, read_scattering
 from ...blender.nodes.tables import ensure_table
 from ...compat import walk_method
@@ -32,15 +33,10 @@ from ...core.measured.model import MeasuredModel, measured_model
 from ...core.progress import run_steps
 from ...core.reflectance.model import RING, SPHERE
 from ...core.scattering.node_radius import BURLEY, sigma0_per_radius
+from ...measuring.cache import cache_folder
 from ...measuring.picture import make_picture, picture_path, show_picture
-from ...measuring.process import (
-    DEFAULT_QUALITY,
-    POLL_SECONDS,
-    RANDOM_WALK,
-    Request,
-    cache_folder,
-    measure_steps,
-)
+from ...measuring.process import POLL_SECONDS, measure_steps
+from ...measuring.request import DEFAULT_QUALITY, RANDOM_WALK, Request
 from .shared import OnTranslucentMaterial, StepByStep, refuse, warn_if_overridden
 
 Colour = tuple[float, float, float]
@@ -180,7 +176,7 @@ def own_scattering(material: bpy.types.Material) -> Scattering:
     assert node is not None
     red, green, blue, _ = node.inputs[ids.BASE_COLOR].default_value
     albedo = (red, green, blue)
-    sigma0 = reflectance_models.channel_sigma0(material)
+    sigma0 = channel_sigma0(material)
     factors = sigma0_per_radius(albedo, walk_method(RANDOM_WALK))
     radius = [float(own / factor) for own, factor in zip(sigma0, factors, strict=True)]
     return Scattering(albedo, (radius[0], radius[1], radius[2]), RANDOM_WALK, 1.0)
@@ -258,7 +254,7 @@ class CDRF_OT_measure(_PathTraced):
         model, sigma0 = found
         table = ensure_table(model)
         material.cdrf.measured, material.cdrf.measured_image = table.key, table.image
-        reflectance_models.set_model(material, model.key)
+        set_model(material, model.key)
         material.cdrf.sigma0 = sigma0
         material.cdrf.sigma0_ratio = (1.0, 1.0, 1.0)
         warn_if_overridden(self, material)
@@ -281,12 +277,12 @@ class CDRF_OT_fit(_PathTraced):
     def finish(self, context: bpy.types.Context, found: Any) -> set[str]:
         material = self._material_of_job()
         model, fitted = found
-        if reflectance_models.has_colour(material):
-            reflectance_models.set_kind(material, SPHERE)
-        name = "ring" if reflectance_models.kind_of_model(material) == RING else "sphere"
+        if has_colour(material):
+            set_kind(material, SPHERE)
+        name = "ring" if kind_of_model(material) == RING else "sphere"
         # Exact at the object's median curvature; the picture shows that sphere.
         sigma0 = sigma0_at(fitted, name, self.radius, self._kappa)
-        reflectance_models.set_channel_sigma0(material, sigma0)
+        set_channel_sigma0(material, sigma0)
         warn_if_overridden(self, material)
         for sentence in fitted.sentences():
             self.report({"INFO"}, sentence)

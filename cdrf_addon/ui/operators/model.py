@@ -7,9 +7,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ... import ids
-from ...blender.material import model as reflectance_models
 from ...blender.material.install import cdrf_node
+from ...blender.material.model import has_colour, set_kind
+from ...blender.material.scatter_distance import apply_preset, set_scattering
 from ...blender.material.scattering import read_scattering
+from ...blender.units import length_text, metres_per_unit
 from ...core.errors import CdrfError
 from ...core.reflectance.model import DEFAULT_KIND, MODEL_ITEMS
 from ...core.scattering.presets import PRESETS
@@ -36,7 +38,7 @@ class CDRF_OT_set_model(OnTranslucentMaterial):
     def execute(self, context: bpy.types.Context) -> set[str]:
         material = self.material(context)
         try:
-            reflectance_models.set_kind(material, self.model)
+            set_kind(material, self.model)
         except CdrfError as error:
             return refuse(self, error)
         warn_if_overridden(self, material)
@@ -79,9 +81,9 @@ class CDRF_OT_preset(OnTranslucentMaterial):
         if self.real_height > 0.0:
             dimensions = context.object.dimensions
             size = (dimensions.z or max(dimensions)) / self.real_height
-        metres = reflectance_models.metres_of(context.scene)
+        metres = metres_per_unit(context.scene)
         try:
-            reflectance_models.apply_preset(material, preset, metres, size)
+            apply_preset(material, preset, metres, size)
         except CdrfError as error:
             return refuse(self, error)
         node = cdrf_node(material)
@@ -102,7 +104,7 @@ class CDRF_OT_preset(OnTranslucentMaterial):
             metres: Length of a world unit.
         """
         blur = sigma0 * obj.data.cdrf.median
-        tall = bpy.utils.units.to_string("METRIC", "LENGTH", obj.dimensions.z * metres)
+        tall = length_text(obj.dimensions.z * metres)
         advice = "give its Real Height in the panel below the viewport (F9)."
         if 0.0 < blur < LOOKS_OPAQUE:
             self.report({"WARNING"}, f"At {tall} tall this object looks opaque: {advice}")
@@ -126,9 +128,9 @@ class CDRF_OT_read_shader(OnTranslucentMaterial):
                 f"Nothing in '{material.name}' scatters: give its Principled BSDF a Subsurface "
                 "Weight and a Scale, or choose a preset.",
             )
-        if reflectance_models.has_colour(material):
-            reflectance_models.set_kind(material, DEFAULT_KIND)
-        reflectance_models.set_scattering(material, found)
+        if has_colour(material):
+            set_kind(material, DEFAULT_KIND)
+        set_scattering(material, found)
         for note in found.notes:
             self.report({"WARNING"}, note)
         warn_if_overridden(self, material)

@@ -9,9 +9,10 @@ from typing import Any
 
 import bpy
 
-from ...blender.material import model as reflectance_models
-from ...blender.material.install import active_skin
-from ...blender.setup import Report, Setup, translucent_objects
+from ...blender.material.scatter_distance import overridden
+from ...blender.material.translucent import active_translucent_material, translucent_objects
+from ...blender.report import Report
+from ...blender.setup import Setup
 from ...core.errors import CdrfError
 from ...core.progress import in_words
 
@@ -50,7 +51,7 @@ def report_setup(operator: bpy.types.Operator, report: Report) -> None:
 
 def warn_if_overridden(operator: bpy.types.Operator, material: bpy.types.Material) -> None:
     """Warn where a keyframe or a link decides the scatter distance, whatever was set."""
-    warning = reflectance_models.overridden(material)
+    warning = overridden(material)
     if warning:
         operator.report({"WARNING"}, warning)
 
@@ -60,7 +61,7 @@ class OnTranslucentMaterial(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        material = active_skin(context.object)
+        material = active_translucent_material(context.object)
         if material is None:
             cls.poll_message_set("Make the object translucent first")
             return False
@@ -71,7 +72,7 @@ class OnTranslucentMaterial(bpy.types.Operator):
 
     def material(self, context: bpy.types.Context) -> bpy.types.Material:
         """Return the material that `poll` found."""
-        found = active_skin(context.object)
+        found = active_translucent_material(context.object)
         assert found is not None
         return found
 

@@ -8,8 +8,9 @@ import math
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
+from ...blender.material.translucent import translucent_materials_on, translucent_objects
 from ...blender.removal import remove_translucency
-from ...blender.setup import Setup, skins_on, translucent_objects
+from ...blender.setup import Setup
 from ...core.curvature.creases import NO_CREASE
 from ...core.curvature.estimators import DEFAULT_METHOD, DEFAULT_RADIUS, METHODS
 from ...core.curvature.field import Options
@@ -101,13 +102,17 @@ class CDRF_OT_remove(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not in_object_mode(cls, context):
             return False
-        if not any(skins_on(obj) for obj in context.selected_objects):
+        if not any(translucent_materials_on(obj) for obj in context.selected_objects):
             cls.poll_message_set("Select a translucent object")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        materials = {material for obj in context.selected_objects for material in skins_on(obj)}
+        materials = {
+            material
+            for obj in context.selected_objects
+            for material in translucent_materials_on(obj)
+        }
         try:
             remove_translucency(context, materials)
         except CdrfError as error:

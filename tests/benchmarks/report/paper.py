@@ -21,8 +21,8 @@ from cdrf_addon.core.measured.model import MeasuredModel
 from cdrf_addon.core.reflectance.lut import build_lut, sample_lut
 from cdrf_addon.core.reflectance.model import sphere
 from cdrf_addon.measuring.figure import draw_fit
-from cdrf_addon.measuring.process import Request
 from cdrf_addon.measuring.process import measure as measure_spheres
+from cdrf_addon.measuring.request import Request
 from node_groups import kinds
 
 from . import texture_blurring

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from rig import Rig, diffuse_material
 from scipy.spatial import cKDTree
 
-from cdrf_addon.blender.mesh.attributes import positions
+from cdrf_addon.blender.mesh.surface import positions
 from cdrf_addon.compat import EEVEE, ensure_node_tree
 
 from .settings import Settings

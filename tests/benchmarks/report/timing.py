@@ -24,8 +24,8 @@ from machine import machine
 from run import mesh_of, peak_megabytes, reset_peak
 from surfaces import ALL_SURFACES
 
-from cdrf_addon.measuring.process import Request
 from cdrf_addon.measuring.process import measure as measure_spheres
+from cdrf_addon.measuring.request import Request
 from node_groups import drawer
 
 from .contenders import (

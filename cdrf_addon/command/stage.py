@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A stage for bare mesh files: import, camera, light, and pictures side by side."""
+"""A stage for bare mesh files: import, camera and light."""
 
 from __future__ import annotations
 
@@ -30,6 +30,14 @@ RIM = ((math.radians(75.0), 0.0, math.radians(-150.0)), 1.2)
 def import_mesh(path: Path, scale: float, subdivisions: int) -> list[bpy.types.Object]:
     """Import a mesh file into an empty scene, smooth, scaled and subdivided.
 
+    Args:
+        path: A file with one of the suffixes of MESH_IMPORTERS.
+        scale: Factor on its size.
+        subdivisions: Smooth subdivisions; each makes four faces of one.
+
+    Returns:
+        Its mesh objects.
+
     Raises:
         SceneError: The file cannot be read or holds no mesh.
     """
@@ -40,35 +48,35 @@ def import_mesh(path: Path, scale: float, subdivisions: int) -> list[bpy.types.O
         importer(str(path))
     except RuntimeError as error:
         raise SceneError(f"{path.name} cannot be read: {str(error).strip()}") from error
-    meshes = [item for item in bpy.context.scene.objects if item.type == "MESH"]
-    if not any(len(item.data.polygons) for item in meshes):
+    meshes = [obj for obj in bpy.context.scene.objects if obj.type == "MESH"]
+    if not any(len(obj.data.polygons) for obj in meshes):
         raise SceneError(f"{path.name} holds no mesh with faces.")
-    roots = [item for item in bpy.context.scene.objects if item.parent is None]
+    roots = [obj for obj in bpy.context.scene.objects if obj.parent is None]
     for root in roots:
         root.scale *= scale
         root.location *= scale
-    for item in meshes:
-        item.data.shade_smooth()
+    for obj in meshes:
+        obj.data.shade_smooth()
         if subdivisions:
-            _subdivide(item, subdivisions)
+            _subdivide(obj, subdivisions)
     bpy.context.view_layer.update()
     return meshes
 
 
-def _subdivide(item: bpy.types.Object, levels: int) -> None:
+def _subdivide(obj: bpy.types.Object, levels: int) -> None:
     """Subdivide for good, so that curvature is stored at the vertices that are rendered."""
-    modifier = item.modifiers.new("Subdivision", "SUBSURF")
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
     modifier.levels = modifier.render_levels = levels
-    evaluated = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = bpy.data.meshes.new_from_object(evaluated)
-    item.modifiers.remove(modifier)
-    item.data = mesh
+    obj.modifiers.remove(modifier)
+    obj.data = mesh
 
 
 def light_and_frame(meshes: list[bpy.types.Object]) -> None:
-    """Give the scene a camera that sees all of the meshes from the front, and two suns."""
+    """Give the scene a camera that shows all of the meshes from the front, and two suns."""
     scene = bpy.context.scene
-    corners = [item.matrix_world @ Vector(corner) for item in meshes for corner in item.bound_box]
+    corners = [obj.matrix_world @ Vector(corner) for obj in meshes for corner in obj.bound_box]
     points = np.array(corners)
     centre = (points.min(axis=0) + points.max(axis=0)) / 2.0
     size = float(np.ptp(points, axis=0)[[0, 2]].max())
@@ -94,41 +102,3 @@ def light_and_frame(meshes: list[bpy.types.Object]) -> None:
     scene.render.engine = EEVEE
     scene.view_settings.view_transform = "Standard"
     bpy.context.view_layer.update()
-
-
-def render_to(path: Path) -> None:
-    """Render the current frame to a file that appears only when it is complete."""
-    render = bpy.context.scene.render
-    part = path.with_name(f".part-{path.name}")
-    kept, overwrite = render.filepath, render.use_overwrite
-    render.filepath, render.use_overwrite = str(part), True
-    try:
-        bpy.ops.render.render(write_still=True)
-    finally:
-        render.filepath, render.use_overwrite = kept, overwrite
-    if not part.exists():
-        raise SceneError(f"No picture was written for {path.name}; is the output folder writable?")
-    part.replace(path)
-
-
-def side_by_side(left: Path, right: Path, target: Path) -> None:
-    """Join two pictures of one size, left and right; the sources stay."""
-    halves = []
-    for path in (left, right):
-        image = bpy.data.images.load(str(path))
-        image.colorspace_settings.name = "Non-Color"
-        pixels = np.empty(len(image.pixels), dtype=np.float32)
-        image.pixels.foreach_get(pixels)
-        halves.append(pixels.reshape(image.size[1], image.size[0], 4))
-        bpy.data.images.remove(image)
-    joined = np.hstack(halves)
-    height, width = joined.shape[:2]
-    floating = target.suffix.lower() == ".exr"
-    image = bpy.data.images.new("Side by side", width, height, float_buffer=floating, is_data=True)
-    image.pixels.foreach_set(np.ascontiguousarray(joined).ravel())
-    part = target.with_name(f".part-{target.name}")
-    image.file_format = "OPEN_EXR" if floating else "PNG"
-    image.filepath_raw = str(part)
-    image.save()
-    bpy.data.images.remove(image)
-    part.replace(target)
