@@ -63,7 +63,7 @@ ROOMS: dict[str, Room] = {
         (*BELOW, *SCENE, "blender/shader", "blender/material"),
     ),
     JOB: Room(
-        "Make Translucent: selection, mesh by mesh, report, state; setup only orders them. Its removal",
+        "Make Translucent: selection, mesh by mesh, report, state; setup orders them. Removal",
         (*BELOW, *BLENDER[:-1]),
     ),
     "measuring": Room(
