@@ -111,7 +111,7 @@ class SceneJob:
 
 def sigma0_label(value: float | None) -> str:
     """Name a scatter distance in a file's name."""
-    # repr tells any two numbers apart, so no picture overwrites another.
+    # repr differs for any two numbers, so no picture overwrites another.
     return "cdrf" if value is None else f"s{value!r}".removesuffix(".0")
 
 
