@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..common.markdown import table
+from ..common.timing import spread
 from .contenders import DEFAULT, LAMBERT, SHADOWS, TEXTURE
-from .results import Results, table, with_spread
-from .scenes import FIGURINE, HEAD
+from .results import Results, with_spread
+from .shapes import FIGURINE, HEAD
 from .substances import PRESET_OF
-from .timing import spread
 
 # What the paper says: look-ups, "a few" operations, "almost" the cost, times faster.
 LOOK_UPS, FEW_NODES, ALMOST, FASTER = 3, 20, 1.25, 10.0

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from ..common.markdown import table
+from ..common.timing import spread
 from .contenders import DEFAULT
-from .results import DASH, Results, table, with_spread
-from .timing import PARTS, base_of, power, split, spread
+from .results import DASH, Results, with_spread
+from .timing import PARTS, base_of, power, split
 
 
 def timing_part(results: Results) -> list[str]:

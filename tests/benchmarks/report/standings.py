@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .cells import MATERIALS
 from .contenders import (
     DEFAULT,
     EEVEE,
@@ -22,9 +23,10 @@ from .contenders import (
     Contender,
     contender_of,
 )
+from .lights import RIGS
 from .matrix import wanted_cells
 from .results import Results
-from .scenes import MATERIALS, RIGS, SHAPES
+from .shapes import SHAPES
 
 Row = Mapping[str, Any]
 

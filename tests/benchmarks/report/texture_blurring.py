@@ -20,10 +20,8 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from cdrf_addon.core.reflectance.models import Profile
 
-from .scenes import Geometry
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from ..common.arrays import Array, Mask
+from .geometry import Geometry
 
 TAPS = np.arange(-3, 4)
 """In standard deviations, as in the chapter's convolution shader."""

@@ -1,232 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures and plots of the report, from what the stages kept."""
+"""Plots: error against time of a frame and of preparation, cost against size."""
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
-from PIL import Image
 
-from cdrf_addon.core.reflectance.models import ring, sphere
-
-from .contenders import (
+from ...common.timing import spread
+from ..contenders import (
     CONTENDERS,
     DEFAULT,
     EEVEE,
-    LAMBERT,
-    NODE,
-    PATHS,
-    PRINCIPLED,
-    SHADOWS,
     TEXTURE,
     contender_of,
 )
-from .matrix import load_pictures, measured_cells, pictures_path, wanted_cells
-from .metrics import displayed
-from .paper import stored
-from .scenes import FIRST
-from .settings import Settings
-from .timing import frame_seconds, spread
-
-Array = NDArray[np.float64]
-
-STYLE: dict[Any, Any] = {
-    "svg.hashsalt": "cdrf",
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e4e4e8",
-    "figure.dpi": 100,
-}
-COLOURS = {
-    "Lambert": "#8c8c94",
-    "CDRF ring": "#d65f00",
-    "CDRF sphere": "#008c5a",
-    "CDRF profile": "#c8408c",
-    "CDRF measured": "#0061c7",
-    "EEVEE scattering": "#7a4fbf",
-    "Texture blurring": "#b08800",
-    "Cycles": "#1a1a1e",
-}
-DIFFERENCE = 8.0
-SHOWN = (
-    LAMBERT,
-    DEFAULT,
-    SHADOWS,
-    "CDRF measured",
-    f"{NODE}, 16",
-    PRINCIPLED,
-    TEXTURE,
-    f"{PATHS}, 16",
-)
-"""In the rows of pictures; those that were not measured are left out."""
-NOSE, CHEEK = (0.42, 0.58, 0.38, 0.54), (0.54, 0.70, 0.36, 0.52)
-"""Left, right, bottom and top of the close-ups, parts of the picture."""
-COLOURS_IN_FILE = 256
-
-
-@contextmanager
-def figure(path: Path, width: float, height: float) -> Iterator[Figure]:
-    """Draw on a figure, which is written without a date; PNGs with a palette."""
-    with mpl.rc_context(STYLE):
-        sheet = Figure(figsize=(width, height), layout="constrained")
-        yield sheet
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if path.suffix == ".svg":
-            sheet.savefig(path, format="svg", metadata={"Date": None})
-            return
-        buffer = io.BytesIO()
-        sheet.savefig(buffer, format="png", metadata={"Software": None})
-        small = Image.open(buffer).convert("RGB").quantize(COLOURS_IN_FILE)
-        small.save(path, optimize=True)
-
-
-def picture(axes: Axes, values: NDArray[Any], title: str = "") -> None:
-    """Show linear radiance as a screen does."""
-    axes.imshow(displayed(values.astype(np.float64)), origin="lower", interpolation="nearest")
-    plain(axes, title)
-
-
-def plain(axes: Axes, title: str = "") -> None:
-    """Take everything but the title off."""
-    axes.set_axis_off()
-    if title:
-        axes.set_title(title, fontsize=8)
-
-
-def brighter(pictures: Mapping[str, NDArray[Any]], key: str) -> float:
-    """Factor that brings the brightest thousandth of a picture near white."""
-    bright = float(np.percentile(pictures[key][..., :3].astype(np.float64).max(axis=-1), 99.9))
-    return 0.9 / max(bright, 1e-6)
-
-
-# --- the paper -----------------------------------------------------------------------------------
-
-
-def paper_figures(settings: Settings) -> list[str]:
-    """Fig. 1 to 4; names of the files."""
-    drawn = []
-    heads = stored(settings, "figure3")
-    if heads:
-        _workflow(settings, heads)
-        _heads(settings, heads)
-        drawn += ["figure1.png", "figure3.png"]
-    spheres = stored(settings, "figure2")
-    if spheres:
-        _spheres(settings, spheres)
-        drawn.append("figure2.png")
-    statue = stored(settings, "figure4")
-    if statue:
-        factor = brighter(statue, "Path tracing")
-        with figure(settings.data / "figure4.png", 2.6 * len(statue), 2.8) as sheet:
-            for axes, (name, values) in zip(
-                sheet.subplots(1, len(statue)), statue.items(), strict=True
-            ):
-                picture(axes, values[..., :3] * factor, name)
-        drawn.append("figure4.png")
-    return drawn
-
-
-def _workflow(settings: Settings, heads: Mapping[str, NDArray[Any]]) -> None:
-    with figure(settings.data / "figure1.png", 11.0, 2.9) as sheet:
-        mesh, curvature, table, render = sheet.subplots(1, 4)
-        picture(mesh, heads["mesh"][..., :3], "1. mesh")
-        picture(curvature, heads["curvature"][..., :3], "2. curvature κ, once")
-        theta, sigma = np.linspace(0.0, math.pi, 200), np.linspace(0.0, 1.5, 120)
-        values = sphere().evaluate(theta[None, :], sigma[:, None])
-        table.imshow(
-            values,
-            origin="lower",
-            aspect="auto",
-            cmap="gray",
-            vmin=0.0,
-            vmax=1.0,
-            extent=(0.0, 180.0, 0.0, 1.5),
-        )
-        table.set_title("3. look-up table f(θ, σ)", fontsize=8)
-        table.set_xlabel("θ, degrees")
-        table.set_ylabel("σ = σ₀ κ")
-        table.grid(visible=False)
-        picture(
-            render, heads["CDRF, shadows"][..., :3] * brighter(heads, "Path tracing"), "4. render"
-        )
-
-
-def _heads(settings: Settings, heads: Mapping[str, NDArray[Any]]) -> None:
-    names = ("curvature", "Lambert", "Texture blurring", "CDRF, shadows", "Path tracing")
-    factor = brighter(heads, "Path tracing")
-    size = len(heads["Lambert"])
-    with figure(settings.data / "figure3.png", 11.5, 6.9) as sheet:
-        rows = sheet.subplots(3, len(names))
-        for column, name in enumerate(names):
-            scale = 1.0 if name == "curvature" else factor
-            whole = heads[name][..., :3] * scale
-            picture(rows[0][column], whole, name)
-            for row, (left, right, low, high) in enumerate((NOSE, CHEEK), start=1):
-                x, y = (
-                    slice(int(left * size), int(right * size)),
-                    slice(int(low * size), int(high * size)),
-                )
-                title = ("nose", "cheek")[row - 1] if column == 0 else ""
-                picture(rows[row][column], whole[y, x], title)
-
-
-def _spheres(settings: Settings, spheres: Mapping[str, NDArray[Any]]) -> None:
-    with figure(settings.data / "figure2.png", 2.2 * len(spheres), 2.5) as sheet:
-        for axes, (name, values) in zip(
-            sheet.subplots(1, len(spheres)), spheres.items(), strict=True
-        ):
-            picture(axes, values[..., :3], f"ratio {name}")
-
-
-# --- the matrix ----------------------------------------------------------------------------------
-
-
-def pictured(settings: Settings) -> list[tuple[str, str]]:
-    """Rows of pictures that are there: cell and file."""
-    cells = [cell for cell in wanted_cells(settings) if settings.sample or cell in FIRST]
-    return [
-        (cell.name, f"cell_{cell.name.replace(', ', '_').replace(' ', '')}.png")
-        for cell in cells
-        if pictures_path(settings, cell).exists()
-    ]
-
-
-def cell_pictures(settings: Settings) -> None:
-    """Contenders, the reference, and eight times the difference."""
-    files = dict(pictured(settings))
-    for cell in wanted_cells(settings):
-        if cell.name not in files:
-            continue
-        pictures = load_pictures(pictures_path(settings, cell))
-        names = [name for name in SHOWN if name in pictures]
-        truth = pictures["reference"][..., :3].astype(np.float64)
-        factor = brighter(pictures, "reference")
-        width = 1.35 * (len(names) + 1)
-        with figure(settings.data / files[cell.name], width, 3.1) as sheet:
-            rows = sheet.subplots(2, len(names) + 1)
-            picture(rows[0][0], truth * factor, "reference")
-            plain(rows[1][0])
-            for column, name in enumerate(names, start=1):
-                values = pictures[name][..., :3].astype(np.float64)
-                title = name.replace("Subsurface Scattering", "scattering node")
-                title = title.replace("EEVEE ", "EEVEE\n").replace("CDRF ", "CDRF\n")
-                title = title.replace(" (the default)", "").replace(" (Diffuse BSDF)", "")
-                picture(rows[0][column], values * factor, title.replace("Random Walk, ", "\n"))
-                off = np.abs(values - truth) * factor * DIFFERENCE
-                picture(rows[1][column], off, f"× {DIFFERENCE:g} difference")
+from ..matrix import measured_cells
+from ..settings import Settings
+from ..timing import frame_seconds
+from .drawing import COLOURS, figure
 
 
 @dataclass(frozen=True)
@@ -290,7 +86,7 @@ def pareto(settings: Settings) -> None:
     floors = measured_cells(settings)
     columns = min(3, len(names))
     rows = math.ceil(len(names) / columns)
-    with figure(settings.data / "pareto.svg", 4.2 * columns, 3.4 * rows) as sheet:
+    with figure(settings.pictures / "pareto.svg", 4.2 * columns, 3.4 * rows) as sheet:
         grid = np.atleast_1d(sheet.subplots(rows, columns, squeeze=False)).ravel()
         seen: dict[str, Any] = {}
         for axes, name in zip(grid, names, strict=False):
@@ -336,7 +132,7 @@ def preparation_plot(settings: Settings) -> bool:
     name = next(iter(cells), None)
     if name is None or not spent:
         return False
-    with figure(settings.data / "preparation.svg", 5.2, 3.6) as sheet:
+    with figure(settings.pictures / "preparation.svg", 5.2, 3.6) as sheet:
         axes = sheet.subplots()
         for one in CONTENDERS:
             rows = cells[name]["contenders"]
@@ -395,7 +191,7 @@ def scaling_plot(settings: Settings) -> bool:
     if not parts:
         return False
     family = {one.name: one.family for one in CONTENDERS}
-    with figure(settings.data / "scaling.svg", 4.0 * len(parts), 3.3) as sheet:
+    with figure(settings.pictures / "scaling.svg", 4.0 * len(parts), 3.3) as sheet:
         for axes, (part, label) in zip(
             sheet.subplots(1, len(parts), squeeze=False)[0], parts, strict=True
         ):
@@ -422,38 +218,3 @@ def scaling_plot(settings: Settings) -> bool:
             axes.set_ylabel("seconds a draw, no shadows")
             axes.legend(fontsize=6)
     return True
-
-
-def lobes(settings: Settings) -> None:
-    """The two closed forms beside Lambert, for Fig. 1's table to be read."""
-    theta = np.linspace(0.0, math.pi, 240)
-    with figure(settings.data / "lobes.svg", 4.6, 3.0) as sheet:
-        axes = sheet.subplots()
-        axes.plot(
-            np.degrees(theta),
-            np.maximum(np.cos(theta), 0.0),
-            color=COLOURS["Lambert"],
-            label="Lambert",
-        )
-        for sigma, style in ((0.2, "-"), (0.6, "--")):
-            for name, model in (("CDRF ring", ring()), ("CDRF sphere", sphere())):
-                axes.plot(
-                    np.degrees(theta),
-                    model.evaluate(theta, np.full_like(theta, sigma)),
-                    style,
-                    color=COLOURS[name],
-                    label=f"{name}, σ = {sigma:g}",
-                )
-        axes.set_xlabel("θ, degrees")
-        axes.set_ylabel("f(θ, σ)")
-        axes.legend(fontsize=7)
-
-
-def draw_all(settings: Settings) -> None:
-    """Draw everything of which there are results."""
-    paper_figures(settings)
-    lobes(settings)
-    cell_pictures(settings)
-    pareto(settings)
-    preparation_plot(settings)
-    scaling_plot(settings)
