@@ -16,8 +16,8 @@ BENCHMARKS = {
     "node_groups": ("half an hour", "nodes and cost of a draw, by lights and shadows"),
     "model_choice": ("half an hour", "which model comes closest to path tracing"),
     "kappa_choice": ("an hour", "which curvature, diffused over which length"),
-    "estimators": ("7 hours", "error against time of curvature estimators (--quick: 2 minutes)"),
-    "report": ("many hours", "error against time of everything (--sample: 3 minutes)"),
+    "estimators": ("7 hours", "error against time of curvature estimators (--quick: minutes)"),
+    "report": ("many hours", "error against time of everything (--sample: minutes)"),
 }
 """Name: how long it takes on two cores, and what it measures."""
 

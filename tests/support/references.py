@@ -3,7 +3,7 @@
 
 From DENSE_FROM on, the plain series with as many terms as it takes, thousands where sigma is small.
 Below, the blur of a straight edge: there the surface is flat at the scale of the blur, and what is
-left out is below LIMIT_ERROR sigma^2 (tests/core/test_heat_kernel.py measures it).
+left out is below LIMIT_ERROR sigma^2 (tests/core/test_sphere_model.py measures it).
 """
 
 from __future__ import annotations

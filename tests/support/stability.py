@@ -2,7 +2,7 @@
 """Which tests try what is stiff or extreme, and the guard in the code that holds it.
 
 `pytest -m stability --stability FILE` runs them and writes what came out; the report makes
-docs/results/stability.md of that file, so that the page tells of a run and not of an intention.
+docs/results/stability.md of that file, so that the page reports a run, not an intention.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Extreme:
 SIGMA, MESHES, KAPPA = "σ: widths of the blur", "Meshes", "κ: curvature"
 LIGHTS, UNITS, TABLES = "Lights and worlds", "Units and sizes", "Tables and measurements"
 CLOSED = "the closed forms change over to a series; arguments are checked at the door"
-CLEAN = "core/mesh.py welds, filters, orients and normalises before any estimate"
+CLEAN = "core/curvature welds, filters, orients and normalises before any estimate"
 NODES = "nodes clamp what they divide by and what they look up"
 
 EXTREMES = (
@@ -87,7 +87,7 @@ EXTREMES = (
     Extreme(KAPPA, "core/test_curvature.py::test_moving_does_not_matter",
             "meshes up to 10⁶ units from their origin", "the same κ", CLEAN),
     Extreme(KAPPA, "core/test_curvature.py::test_other_radii_are_refused_in_a_sentence",
-            "0, −1, 10⁹, NaN and ∞ rings", "a sentence", "core/curvature.py checks its options"),
+            "0, −1, 10⁹, NaN and ∞ rings", "a sentence", "core/curvature checks its options"),
     Extreme(KAPPA, "core/test_diffusion.py::test_needles_and_specks_stay_finite",
             "heat steps of 10⁻³ to 30 on needles and on a speck far away", "finite",
             "needles are softened, overshoots cut to the field's range"),
@@ -97,7 +97,7 @@ EXTREMES = (
             "conjugate gradients start from the field itself"),
     Extreme(KAPPA, "core/test_curvature.py::test_pieces_too_small_for_a_fit",
             "pieces with fewer vertices than a fit needs", "filled in from their neighbours",
-            "estimators say where they have nothing to say"),
+            "estimators mark where they have no value"),
     Extreme(KAPPA, "core/test_curvature.py::test_a_hub_of_5000_edges_is_quick",
             "a vertex with 5,000 edges", "done in seconds", "rings have a largest size"),
     Extreme(MESHES, "core/test_crash_list.py::test_no_crash_no_hang_no_nonsense",
@@ -126,17 +126,18 @@ EXTREMES = (
             "every light type and setting at σ₀ = 0", "EEVEE's Diffuse BSDF",
             "the radiometry of decision 3"),
     Extreme(LIGHTS, "core/test_finite_light.py::test_the_blur_stands_for_the_light",
-            "lights up to half-angles of 46°", "within the stated error", "core/finite_light.py"),
+            "lights up to half-angles of 46°", "within the stated error",
+            "core/reflectance/finite_light.py"),
     Extreme(LIGHTS,
             "core/test_environment.py::test_senseless_pixels_are_black_and_shapes_are_checked",
             "worlds with pixels of NaN, ∞ and negative radiance", "black there",
-            "core/ambient.py clips"),
+            "core/reflectance/environment.py clips"),
     Extreme(LIGHTS, "core/test_environment.py::test_extremes_of_sigma",
             "a world's light at σ of 0 and ∞", "Lambert's, and its mean", "closed band factors"),
     Extreme(LIGHTS, "render/test_ambient.py::test_no_node_for_a_black_or_missing_world",
             "no world, and a black one", "no node, no error", "a world is wired only if it shines"),
     Extreme(LIGHTS, "render/test_shadows.py::test_four_lights_share_a_mask",
-            "four casting lights, which no normal tells apart", "one shared mask, within its bound",
+            "four casting lights, which no normal separates", "one shared mask, within its bound",
             "decision 11"),
     Extreme(UNITS, "blender/test_models.py::test_presets_are_millimetres_in_the_scenes_units",
             "scenes in metres, centimetres and without units", "the same millimetres",
@@ -146,14 +147,16 @@ EXTREMES = (
     Extreme(UNITS, "blender/test_setup.py::test_small_values_reach_the_shader_unsnapped",
             "tiny σ₀ and κ", "not rounded to 0", "sockets without a least value"),
     Extreme(UNITS, "core/test_presets.py::test_impossible_media_are_refused_in_a_sentence",
-            "scattering coefficients of 0, −1, NaN, ∞", "a sentence", "core/dipole.py"),
+            "scattering coefficients of 0, −1, NaN, ∞", "a sentence", "core/scattering/dipole.py"),
     Extreme(TABLES, "core/test_measured.py::test_finite_and_never_negative",
             "measured tables at every σ, 0 and ∞ included", "finite, never negative",
             "rows end where nothing changes any more"),
     Extreme(TABLES, "core/test_measured.py::test_foreign_and_broken_files_are_refused",
-            "damaged and foreign files", "a sentence, and measured again", "core/measurement.py"),
+            "damaged and foreign files", "a sentence, and measured again",
+            "core/measured checks what it reads"),
     Extreme(TABLES, "core/test_measured.py::test_impossible_measurements_are_refused",
-            "measurements that hold NaN or impossible values", "a sentence", "core/measurement.py"),
+            "measurements that hold NaN or impossible values", "a sentence",
+            "core/measured checks what it reads"),
     Extreme(TABLES, "blender/test_measuring.py::test_a_deleted_measured_table_is_said",
             "a measured table deleted from the file", "the sphere model, and a sentence",
             "the default stands in"),
@@ -177,18 +180,18 @@ class Collector:
         function = nodeid.rpartition("::")[2].partition("[")[0]
         return by_test().get(f"{path.relative_to(self._tests).as_posix()}::{function}")
 
-    def add(self, extreme: Extreme, nodeid: str, outcome: str, seconds: float, said: str) -> None:
+    def add(self, extreme: Extreme, nodeid: str, outcome: str, seconds: float, values: str) -> None:
         """Note one case."""
         row = self._found.setdefault(extreme.test, asdict(extreme) | {"cases": []})
         case = nodeid.partition("[")[2].rstrip("]")
-        known = {"case": case, "outcome": outcome, "seconds": round(seconds, 2), "said": said}
+        known = {"case": case, "outcome": outcome, "seconds": round(seconds, 2), "said": values}
         row["cases"].append(known)
 
     def write(self, path: Path, facts: dict[str, str]) -> None:
         """Write everything as JSON."""
         ordered = [self._found[one.test] for one in EXTREMES if one.test in self._found]
         missing = [one.test for one in EXTREMES if one.test not in self._found]
-        told = {"date": time.strftime("%Y-%m-%d"), "machine": facts, "tests": ordered,
+        results = {"date": time.strftime("%Y-%m-%d"), "machine": facts, "tests": ordered,
                 "not run": missing}  # fmt: skip
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

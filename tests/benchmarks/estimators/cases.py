@@ -29,7 +29,7 @@ QUANTITIES = ("k1", "k2", "mean", "kappa")
 
 @dataclass(frozen=True)
 class Family:
-    """Surfaces whose errors are told together."""
+    """Surfaces whose errors are reported together."""
 
     title: str
     surfaces: tuple[str, ...]

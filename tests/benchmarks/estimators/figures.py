@@ -107,8 +107,8 @@ def draw_scaling(results: Results, path: Path) -> bool:
             sizes = np.array([run.vertices for run in runs], dtype=np.float64)
             seconds = [run.seconds for run in runs]
             colour = colour_of(runs[0].method)
-            told = f"{name}: n^{exponent(sizes, seconds)[0]:.2f}" if len(runs) > 1 else name
-            axis.plot(sizes, seconds, "o-", color=colour, markersize=3, linewidth=1, label=told)
+            label = f"{name}: n^{exponent(sizes, seconds)[0]:.2f}" if len(runs) > 1 else name
+            axis.plot(sizes, seconds, "o-", color=colour, markersize=3, linewidth=1, label=label)
             guide = sizes * np.log(sizes)
             axis.plot(sizes, seconds[-1] * guide / guide[-1], ":", color=colour, linewidth=0.8)
         axis.plot([], [], ":", color="black", linewidth=0.8, label="n log n")

@@ -119,7 +119,7 @@ def measure_errors(
     missing: bool,
     save: Callable[[], None],
 ) -> None:
-    """Measure rows, those of a mesh together; keep what `missing` says may stay."""
+    """Measure rows, those of a mesh together; with `missing`, keep what was measured before."""
     jobs: dict[tuple[str, int], list[Row]] = {}
     for row in wanted:
         if not (missing and is_there(row, results.rows)):

@@ -101,7 +101,7 @@ def conclusions(summary: Summary) -> list[str]:
     if not rows:
         return ["Nothing measured on irregular meshes yet.", ""]
     never = [name_of(config) for config in summary.configs if config not in often]
-    told = [
+    phrases = [
         f"Of the {len(rows)} cases of noise and size on irregular meshes (RMS error of κ against "
         "CPU seconds):",
         "",
@@ -110,7 +110,7 @@ def conclusions(summary: Summary) -> list[str]:
         "- least error × time: " + _ranking(best, len(rows)) + ".",
     ]
     if behind:
-        told.append(
+        phrases.append(
             f"- The default, {name_of(usual)}: on the front in {often[usual]} of {len(rows)}; its "
             f"error × time is {short(statistics.median(behind))} times the least in the median, "
             f"{short(max(behind))} times at the worst."
@@ -118,7 +118,7 @@ def conclusions(summary: Summary) -> list[str]:
             else ""
         )
     head = ["noise", "vertices", "Pareto front, quick to accurate", "least error × time"]
-    return [*told, "", *table([*head, "its κ RMS, %", "its CPU s"], rows)]
+    return [*phrases, "", *table([*head, "its κ RMS, %", "its CPU s"], rows)]
 
 
 def _ranking(counted: Counter[Config], of: int) -> str:

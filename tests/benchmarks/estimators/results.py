@@ -79,7 +79,7 @@ class Results:
 def _brief(value: Any) -> Any:
     """Four digits are enough, and what is empty need not be written."""
     if isinstance(value, dict):
-        return {key: _brief(item) for key, item in value.items() if item not in ("", {})}
+        return {key: _brief(part) for key, part in value.items() if part not in ("", {})}
     return float(f"{value:.4g}") if isinstance(value, float) else value
 
 

@@ -61,7 +61,7 @@ class Report:
         return float(np.mean([self.relative(fits, kernel, kind, rule) for kernel in KERNELS]))
 
     def conclusions(self) -> list[str]:
-        """What the numbers say, in sentences."""
+        """Return sentences on what the numbers show."""
         best = [
             f"{kernel}: *{kind}* with {rule} ({error:.3f})"
             for kernel in KERNELS

@@ -96,7 +96,7 @@ def render(wires: Sequence[Wire]) -> list[Values]:
 
 
 def check_arguments() -> float:
-    """Render the arguments themselves; the largest difference to what `arguments` says."""
+    """Render the arguments themselves; return the largest difference to `arguments`."""
     cosine, sigma = arguments()
     seen = render([lambda _, c, s: c, lambda b, c, s: b.math("MULTIPLY", s, 1.0 / SIGMA_MAX)])
     worst = max(

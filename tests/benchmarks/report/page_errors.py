@@ -58,8 +58,8 @@ def _fronts(results: Results) -> list[str]:
              "alike:", ""]  # fmt: skip
     for name, found in plots.plotted(results.settings).items():
         own = plots.front(plots.at_equal_samples(found))
-        told = [f"{one.name} ({one.seconds:.2f}, {one.error:.4f})" for one in own]
-        lines.append(f"- {name}: {', '.join(told)}.")
+        phrases = [f"{one.name} ({one.seconds:.2f}, {one.error:.4f})" for one in own]
+        lines.append(f"- {name}: {', '.join(phrases)}.")
     return [*lines, ""]
 
 
@@ -96,7 +96,7 @@ def scenes_page(results: Results) -> list[str]:
 
 
 def _detailed(results: Results, *, first: bool) -> dict[Cell, Row]:
-    """Measured cells that are told in full on the report's page, or on the other one."""
+    """Measured cells that are shown in full on the report's page, or on the other one."""
     sample = results.settings.sample
     return {
         cell: results.cells[cell.name]
@@ -114,7 +114,7 @@ def _method(results: Results) -> list[str]:
         "surface to surface, which no contender but Cycles has. *Floor* is the Monte-Carlo "
         "error of the mean, half the RMSE between the two; what the denoiser does to both "
         "alike is not in it. Cycles' walk enters half by cosine, half by refraction, so its "
-        "skin looks different from different sides ([measured.md](measured.md)), which no other "
+        "surfaces look different from different sides ([measured.md](measured.md)), which no other "
         "contender does.",
         "",
         "**Materials**: the presets' σ₀ in millimetres ("
@@ -141,11 +141,13 @@ def _method(results: Results) -> list[str]:
     ]
     taken = results.errors.get("sun taken out")
     if taken:
-        told = "; ".join(f"{name} {off:.4f}, {on:.4f}" for name, (off, on) in taken["rmse"].items())
+        phrases = "; ".join(
+            f"{name} {off:.4f}, {on:.4f}" for name, (off, on) in taken["rmse"].items()
+        )
         lines += [
             "By default EEVEE takes what is bright in a world's picture out of it as one sun with "
             "a hard shadow. Here that is switched off: "
-            f"RMSE in {taken['cell']} without and with it: {told}.",
+            f"RMSE in {taken['cell']} without and with it: {phrases}.",
             "",
         ]
     found = results.errors.get("bounces")

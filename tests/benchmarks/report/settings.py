@@ -25,7 +25,7 @@ class Settings:
         size: Pixels of the matrix, each way.
         large: Pixels of the pictures of the paper's figures.
         samples: Paths through a pixel in each of the two pictures of a reference.
-        film: EEVEE samples where nothing else is said.
+        film: EEVEE samples by default.
         level: Subdivisions of the shapes.
         atlas: Texels of texture blurring, each way.
         quality: Of measured spheres (cdrf_addon/measuring).

@@ -37,7 +37,7 @@ def run(settings: Settings) -> None:
     ]
     done = subprocess.run(command, cwd=ROOT, check=False, capture_output=True, text=True)
     print("\n".join(done.stdout.strip().splitlines()[-3:]), flush=True)
-    # 1 is a test that failed, which the page has to say.
+    # 1 is a test that failed, which the page has to report.
     if done.returncode not in (0, 1):
         raise RuntimeError(f"pytest ended with {done.returncode}: {done.stdout}{done.stderr}")
 

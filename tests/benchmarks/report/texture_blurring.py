@@ -214,7 +214,7 @@ def shade(geometry: Geometry, lighting: Lighting, albedo: Array, profile: Profil
 
     Args:
         geometry: With UVs.
-        lighting: What arrives at the surface; its time is told apart, as a renderer has it anyway.
+        lighting: What arrives at the surface; timed apart, as a renderer has it anyway.
         albedo: (3,).
         profile: Widths in mm.
         millimetres: In a world unit.
