@@ -29,11 +29,11 @@ def rig(_enabled: None):
     return Rig()
 
 
-# --- what the page on stability tells (tests/support/stability.py) ------------------------------
+# --- what the page on stability reports (tests/support/stability.py) ------------------------------
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--stability", type=Path, help="write what extreme cases came to, as JSON")
+    parser.addoption("--stability", type=Path, help="write the outcome of extreme cases, as JSON")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -55,14 +55,14 @@ def pytest_runtest_makereport(
     collector = item.config.stash[STABILITY]
     extreme = collector.entry(item.nodeid, item.path)
     if extreme is not None and (report.when == "call" or report.failed):
-        said = "; ".join(str(value) for _, value in report.user_properties)
-        collector.add(extreme, item.nodeid, report.outcome, report.duration, said)
+        values = "; ".join(str(value) for _, value in report.user_properties)
+        collector.add(extreme, item.nodeid, report.outcome, report.duration, values)
     return report
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     path = session.config.getoption("--stability")
     if path is not None:
-        from machine import machine
+        from tests.benchmarks.common.machine import machine
 
         session.config.stash[STABILITY].write(path, machine())

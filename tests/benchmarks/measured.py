@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The measured model and the fits of sigma0: writes results/measured.md and data/measured.json.
+"""The measured model and the fits of sigma0: docs/results/measured.md.
 
-    ./dev python tests/benchmarks/measured.py            everything, about ten minutes on two cores
-    ./dev python tests/benchmarks/measured.py --only fits     one part, or several
-    ./dev python tests/benchmarks/measured.py --only          the page from the JSON
-    ./dev python tests/benchmarks/measured.py --fine          also the time of the fine quality
+    ./dev bench measured                everything, about ten minutes on two cores
+    ./dev bench measured --only fits    one part, or several
+    ./dev bench measured --only         the page from the JSON
+    ./dev bench measured --fine         also the time of the fine quality
 
-Measurements are kept in the folder given by --cache and used again; a time is told only of those
-that were rendered in this run, and the earlier ones stay in the JSON.
+Measurements are kept in the folder given by --cache and used again; only those
+rendered in this run are timed, and the earlier ones stay in the JSON.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
 import sys
@@ -23,27 +22,27 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
+import numpy as np
+from numpy.typing import NDArray
 
-import numpy as np  # noqa: E402  (the checkout must be importable first)
-from machine import machine  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
+from cdrf_addon.core.measured.fitting import MODELS, ModelFitter
+from cdrf_addon.core.measured.material_fit import fit_material
+from cdrf_addon.core.measured.measurement import SphereMeasurement, equator_weights
+from cdrf_addon.core.measured.model import MeasuredModel
+from cdrf_addon.measuring.cache import cached
+from cdrf_addon.measuring.process import measure
+from cdrf_addon.measuring.request import QUALITIES, Request
 
-from cdrf_addon.core.measured.fitting import MODELS, ModelFitter  # noqa: E402
-from cdrf_addon.core.measured.material_fit import fit_material  # noqa: E402
-from cdrf_addon.core.measured.measurement import SphereMeasurement, equator_weights  # noqa: E402
-from cdrf_addon.core.measured.model import MeasuredModel  # noqa: E402
-from cdrf_addon.measuring.cache import cached  # noqa: E402
-from cdrf_addon.measuring.process import measure  # noqa: E402
-from cdrf_addon.measuring.request import QUALITIES, Request  # noqa: E402
+from .common.files import read_results, rounded, write_page, write_results
+from .common.machine import machine
+from .common.markdown import facts, generated, table
 
 Array = NDArray[np.float64]
 Albedo = tuple[float, float, float]
 
 SETS: tuple[Albedo, ...] = ((0.5, 0.8, 0.9), (0.95, 0.97, 0.99), (0.1, 0.2, 0.3), (0.4, 0.6, 0.7))
 TABLE_ALBEDOS = (0.5, 0.8, 0.9, 0.95, 0.99)
-# Rows of the tables that are nearest to the scales of docs by hand: 0.02 to 3.
+# Scales of the page, rows of the measured tables: 0.02 to 3.
 TABLE_SCALES = (0.022097, 0.044194, 0.088388, 0.176777, 0.5, 1.0, 2.828427)
 FRESH_SEED = 77
 TIMED_SEED = 1
@@ -78,8 +77,8 @@ class Study:
         return found
 
 
-def honest_rms(difference: Array, errors: Array, weights: Array) -> float:
-    """RMS without the part that the reference's Monte-Carlo error has in it."""
+def rms_without_noise(difference: Array, errors: Array, weights: Array) -> float:
+    """Return the RMS without the part that the reference's Monte-Carlo error has in it."""
     return float(np.sqrt(max(((difference**2 - errors**2) * weights).sum(), 0.0)))
 
 
@@ -146,9 +145,9 @@ def off_rows(study: Study) -> list[dict[str, Any]]:
                         "albedo": albedo[channel],
                         "radius": radius[channel],
                         "scale": float(scale),
-                        "measured": honest_rms(values[:, channel] - truth, errors, weights),
+                        "measured": rms_without_noise(values[:, channel] - truth, errors, weights),
                         "noise": float(np.sqrt((errors**2 * weights).sum())),
-                        "lambert": honest_rms(lambert, errors, weights),
+                        "lambert": rms_without_noise(lambert, errors, weights),
                         **{name: one.fit(truth).rms for name, one in fitters.items()},
                     }
                 )
@@ -168,12 +167,12 @@ def views(study: Study) -> list[dict[str, Any]]:
     found = []
     for elevation in ELEVATIONS[1:]:
         other = measured[elevation]
-        seen = (other.cosine > side.cosine[0]) & (other.cosine < side.cosine[-1])
-        seen &= other.cosine > 0.3
+        within = (other.cosine > side.cosine[0]) & (other.cosine < side.cosine[-1])
+        within &= other.cosine > 0.3
         for row, scale in enumerate(VIEW_SCALES):
             for channel in range(3):
                 there = np.interp(other.cosine, side.cosine, side.values[row, channel])
-                ratio = other.values[row, channel][seen] / there[seen]
+                ratio = other.values[row, channel][within] / there[within]
                 found.append(
                     {
                         "elevation": elevation,
@@ -197,15 +196,15 @@ def ratio_claim(study: Study) -> list[dict[str, Any]]:
         for row in (0, 1):
             difference = together.values[row, channel] - alone.values[row, channel]
             errors = np.hypot(together.errors[row, channel], alone.errors[row, channel])
-            seen = errors > 1e-4
+            within = errors > 1e-4
             found.append(
                 {
                     "albedo": SKIN[channel],
                     "radius": radius,
                     "scale": float(together.scales[row]),
-                    "rms": float(np.sqrt((difference[seen] ** 2).mean())),
-                    "noise": float(np.sqrt((errors[seen] ** 2).mean())),
-                    "chi_squared": float(((difference[seen] / errors[seen]) ** 2).mean()),
+                    "rms": float(np.sqrt((difference[within] ** 2).mean())),
+                    "noise": float(np.sqrt((errors[within] ** 2).mean())),
+                    "chi_squared": float(((difference[within] / errors[within]) ** 2).mean()),
                 }
             )
     return found
@@ -233,22 +232,11 @@ PARTS: dict[str, Callable[[Study], dict[str, Any]]] = {
 }
 
 
-def to_table(head: list[str], rows: list[list[str]]) -> list[str]:
-    """Make a Markdown table."""
-    return [
-        "| " + " | ".join(head) + " |",
-        "|" + "---|" * len(head),
-        *("| " + " | ".join(row) + " |" for row in rows),
-        "",
-    ]
-
-
 def page(results: dict[str, Any]) -> str:
     """Everything, as Markdown."""
-    facts = ", ".join(f"{name} {value}" for name, value in results["machine"].items())
     lines = ["# Reflectance measured on path-traced spheres, and fits to it", ""]
-    lines += ["Generated by `tests/benchmarks/measured.py`; do not edit.", ""]
-    lines += [f"Measured on: {facts}.", ""]
+    lines += [generated("measured"), ""]
+    lines += [f"Measured on: {facts(results['machine'])}.", ""]
     lines += [
         "Cycles, Subsurface Scattering node, Random Walk, one sun without angle, light across the "
         "view, no light from surface to surface. Values are radiance / (albedo · irradiance / π); "
@@ -271,9 +259,9 @@ def page(results: dict[str, Any]) -> str:
             cells += [f"{fixed['sigma']:.3f}", f"{fixed['rms']:.4f}"]
             cells += [f"{free['sigma']:.3f}", f"{free['gain']:.3f}", f"{free['rms']:.4f}"]
         rows.append([*cells, f"{row['measured']:.4f}", f"{row['noise']:.4f}"])
-    lines += to_table(head, rows)
+    lines += table(head, rows)
     lines += ["## σ0 in units of the scatter radius, gain free", ""]
-    lines += to_table(
+    lines += table(
         ["albedo", "ring", "sphere", "holds to scale (ring)", "(sphere)", "gain as scale → 0"],
         [
             [f"{s['albedo']:g}"]
@@ -284,7 +272,7 @@ def page(results: dict[str, Any]) -> str:
         ],
     )
     lines += ["## Spheres that are in no table, another seed (noise subtracted)", ""]
-    lines += to_table(
+    lines += table(
         ["albedo", "radius", "scale", "measured", "ring, gain 1", "sphere, gain 1", "Lambert",
          "noise of the reference"],
         [
@@ -298,7 +286,7 @@ def page(results: dict[str, Any]) -> str:
         together = math.sqrt(float((errors**2).mean()))
         lines += [f"Worst {errors.max():.4f}, RMS of all {together:.4f}.", ""]
     lines += ["## A channel does not know of the others", ""]
-    lines += to_table(
+    lines += table(
         ["albedo", "radius", "scale", "RMS of the difference", "expected from noise", "χ²"],
         [
             [f"{r['albedo']:g}", f"{r['radius']:g}", f"{r['scale']:g}", f"{r['rms']:.4f}",
@@ -314,7 +302,7 @@ def page(results: dict[str, Any]) -> str:
         "N·L > 0.3; elevation 89° is light from behind the camera.",
         "",
     ]
-    lines += to_table(
+    lines += table(
         ["light's elevation", "albedo", "scale", "least", "mean", "most"],
         [
             [f"{r['elevation']:g}°", f"{r['albedo']:g}", f"{r['scale']:g}"]
@@ -323,7 +311,7 @@ def page(results: dict[str, Any]) -> str:
         ],
     )
     lines += ["## Time", ""]
-    lines += to_table(
+    lines += table(
         ["quality", "pixels a sphere", "paths a pixel", "wall s", "CPU s of the child"],
         [
             [name, f"{quality.pixels[0]} × {quality.pixels[1]}",
@@ -338,33 +326,25 @@ def page(results: dict[str, Any]) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def rounded(value: Any) -> Any:
-    """Keep five digits of every number."""
-    if isinstance(value, dict):
-        return {key: rounded(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [rounded(item) for item in value]
-    return float(f"{value:.5g}") if isinstance(value, float) else value
-
-
 def main() -> None:
     """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--cache", type=Path, default=Path(tempfile.gettempdir()) / "cdrf_measured")
     parser.add_argument("--fine", action="store_true", help="also the time of the fine quality")
     parser.add_argument("--only", nargs="*", choices=PARTS, default=list(PARTS))
     options = parser.parse_args()
-    store = ROOT / "docs" / "results" / "data" / "measured.json"
-    results = json.loads(store.read_text(encoding="utf-8")) if store.exists() else {}
+    results = read_results("measured")
     study = Study(options.cache)
     for part in options.only:
         results |= {"machine": machine(), **PARTS[part](study)}
         if part == "times" and options.fine:
             study.get(Request(SETS[0], "fine", TIMED_SEED))
         results["seconds"] = results.get("seconds", {}) | study.seconds
-        results = rounded(results)
-        store.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    (ROOT / "docs" / "results" / "measured.md").write_text(page(results), encoding="utf-8")
+        results = rounded(results, 5)
+        write_results("measured", results)
+    write_page("measured", page(results))
     sys.stdout.flush()
     os._exit(0)  # Blender 4.5 as a module now and then hangs in its libraries' destructors
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the node group holds and costs, by lights and shadows: writes docs/results/node_groups.md.
+"""What the node group holds and costs, by lights and shadows: docs/results/node_groups.md.
 
-    ./dev python tests/benchmarks/node_groups.py         half an hour on two cores; Blender 5.2
+    ./dev bench node_groups         half an hour on two cores; Blender 5.2
 
 Viewport draws, interleaved: in each round every contender is drawn in turn, so that a drift of the
 machine meets all alike. Ratios are to the Diffuse BSDF with the same lights. Times are CPU seconds
@@ -11,27 +11,26 @@ of all threads: a software rasteriser spends nothing else, and other jobs distur
 from __future__ import annotations
 
 import argparse
-import itertools
 import math
-import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
+import bpy
+import numpy as np
+from rig import Rig, cdrf_node, diffuse_material
 
-import bpy  # noqa: E402  (the checkout must be importable first)
-import numpy as np  # noqa: E402
-from machine import machine  # noqa: E402
-from rig import Rig, cdrf_node, diffuse_material  # noqa: E402
+from cdrf_addon import ids, register, unregister
+from cdrf_addon.compat import ensure_node_tree
 
-from cdrf_addon import ids, register, unregister  # noqa: E402
-from cdrf_addon.compat import ensure_node_tree  # noqa: E402
+from .common.draws import drawer, node_types
+from .common.files import write_page
+from .common.machine import machine
+from .common.markdown import facts, generated, table
+from .common.pictures import image_of
+from .common.timing import spread
 
 PIXELS = 1024
-GREY, SKIN = (1.0, 1.0, 1.0), (1.0, 0.35, 0.2)
+GREY, RGB = (1.0, 1.0, 1.0), (1.0, 0.35, 0.2)
 COUNTS = (1, 2, 4, 8, 16)
 SHADOWED = (1, 2, 3, 4)
 
@@ -54,17 +53,6 @@ class Contender:
     times: list[float] = field(default_factory=list)
 
 
-def kinds(tree: bpy.types.ShaderNodeTree) -> list[str]:
-    """Types of the nodes of a tree and of its groups, each time they are used."""
-    found = []
-    for node in tree.nodes:
-        if node.type == "GROUP":
-            found += kinds(node.node_tree)
-        elif node.type not in {"GROUP_INPUT", "GROUP_OUTPUT"}:
-            found.append(node.type)
-    return found
-
-
 def sky() -> bpy.types.World:
     """A world of one picture, bright above and coloured all round, without a sun."""
     width, height = 64, 32
@@ -73,8 +61,7 @@ def sky() -> bpy.types.World:
     pixels = np.ones((height, width, 4), dtype=np.float32)
     for channel in range(3):
         pixels[..., channel] = 0.6 + 0.3 * up + 0.2 * np.cos(round_ + 2.0 * channel)
-    image = bpy.data.images.new("Sky", width, height, float_buffer=True)
-    image.pixels.foreach_set(pixels.ravel())
+    image = image_of("Sky", pixels)
     world = bpy.data.worlds.new("Sky")
     tree = ensure_node_tree(world)
     texture = tree.nodes.new("ShaderNodeTexEnvironment")
@@ -88,8 +75,8 @@ class Stage:
 
     def __init__(self) -> None:
         self.rig = Rig()
-        self.item = self.rig.sphere(subdivisions=6)
-        self.item.scale = (1.0, 1.0, 1.001)  # not quite a sphere: the shader reads the attribute
+        self.obj = self.rig.sphere(subdivisions=6)
+        self.obj.scale = (1.0, 1.0, 1.001)  # not quite a sphere: the shader reads the attribute
         self.suns = [
             self.rig.light(
                 "SUN",
@@ -112,11 +99,11 @@ class Stage:
     def show(self, contender: Contender) -> None:
         """Make the scene a contender's."""
         self.light(contender.lights, shadows=contender.shadows)
-        self.item.data.materials.clear()
-        self.item.data.materials.append(contender.material)
+        self.obj.data.materials.clear()
+        self.obj.data.materials.append(contender.material)
         bpy.context.view_layer.update()
 
-    def skin(
+    def translucent(
         self,
         lights: int,
         ratio: Sequence[float],
@@ -126,7 +113,7 @@ class Stage:
         model: str = "SPHERE",
     ) -> Contender:
         """Make a material with a shader group of its own for these lights."""
-        material = bpy.data.materials.new("Skin")
+        material = bpy.data.materials.new("Translucent")
         kind = "coloured shadows" if edges else "shadows" if shadows else "no shadows"
         colour = "profile" if model == "PROFILE" else "grey" if ratio == GREY else "RGB"
         contender = Contender(f"CDRF, {colour}, {kind}", material, lights, shadows)
@@ -137,7 +124,7 @@ class Stage:
         assert bpy.ops.cdrf.setup() == {"FINISHED"}
         material.cdrf.sigma0 = 0.2
         material.cdrf.sigma0_ratio = ratio
-        node = cdrf_node(self.item)
+        node = cdrf_node(self.obj)
         node.node_tree = tree = node.node_tree.copy()
         tree[ids.SCENE_KEY] = (
             f"benchmark {contender.name} {lights}"  # the next set-up leaves it alone
@@ -148,7 +135,7 @@ class Stage:
         material.node_tree.links.new(node.outputs[ids.SHADER], output.inputs["Surface"])
         if ids.THICKNESS in node.outputs and shadows:
             material.node_tree.links.new(node.outputs[ids.THICKNESS], output.inputs[ids.THICKNESS])
-        inside = kinds(tree)
+        inside = node_types(tree)
         contender.nodes, contender.own = len(inside), len(tree.nodes)
         contender.lookups = inside.count("TEX_IMAGE")
         return contender
@@ -177,50 +164,19 @@ def contenders(stage: Stage) -> list[Contender]:
     found += [Contender("Diffuse", diffuse, n) for n in (0, *COUNTS)]
     found += [Contender("Diffuse", diffuse, n, True) for n in SHADOWED]
     found += [Contender("Principled, subsurface", scatter, n) for n in (1, 4)]
-    found += [stage.skin(n, ratio) for n in COUNTS for ratio in (GREY, SKIN)]
-    found += [stage.skin(n, GREY, model="PROFILE") for n in (1, 4)]
-    found.append(stage.skin(0, SKIN))
-    found += [stage.skin(n, SKIN, shadows=True) for n in SHADOWED]
-    found += [stage.skin(n, SKIN, shadows=True, edges=True) for n in (1, 3)]
+    found += [stage.translucent(n, ratio) for n in COUNTS for ratio in (GREY, RGB)]
+    found += [stage.translucent(n, GREY, model="PROFILE") for n in (1, 4)]
+    found.append(stage.translucent(0, RGB))
+    found += [stage.translucent(n, RGB, shadows=True) for n in SHADOWED]
+    found += [stage.translucent(n, RGB, shadows=True, edges=True) for n in (1, 3)]
     return found
-
-
-def drawer(rig: Rig, pixels: int = PIXELS) -> Callable[[], float]:
-    """Return a function that draws once into a viewport, so large, and tells the CPU seconds."""
-    import gpu  # late: only Blender 5.2 can draw without a window
-
-    gpu.init()
-    rig.scene.eevee.taa_samples = 1
-    area = next(a for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
-    space = area.spaces.active
-    space.shading.type = "RENDERED"
-    space.overlay.show_overlays = False
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    target = gpu.types.GPUOffScreen(pixels, pixels, format="RGBA16F")
-    view = rig.camera.matrix_world.inverted()
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    lens = rig.camera.calc_matrix_camera(depsgraph, x=pixels, y=pixels)
-    turns = itertools.count()
-
-    def draw() -> float:
-        # A view that stands still is not drawn again, so each is a hair beside the last.
-        view.translation.x = 1e-5 * next(turns)
-        start = time.process_time()
-        target.draw_view3d(
-            rig.scene, bpy.context.view_layer, space, region, view, lens, do_color_management=False
-        )
-        with target.bind():  # reading a pixel waits for the drawing to end
-            gpu.state.active_framebuffer_get().read_color(0, 0, 1, 1, 4, 0, "FLOAT")
-        return time.process_time() - start
-
-    return draw
 
 
 def measure(rounds: int) -> None:
     """Draw all contenders in turn, several times, and write the page after each round."""
     stage = Stage()
     found = contenders(stage)
-    draw = drawer(stage.rig)
+    draw = drawer(stage.rig, PIXELS)
     for contender in found:
         stage.show(contender)
         contender.first = draw()
@@ -232,13 +188,13 @@ def measure(rounds: int) -> None:
             contender.times.append(draw())
         print(f"round {turn + 1} of {rounds}", flush=True)
         # Kept after each round, as a busy machine may not come to the last.
-        (ROOT / "docs" / "results" / "node_groups.md").write_text(page(found))
+        write_page("node_groups", page(found))
 
 
 def row(contender: Contender, base: Contender) -> list[str]:
     """One line of the table: medians, and the spread of the ratio over the draws."""
     ratios = np.array(contender.times) / np.array(base.times)
-    low, middle, high = np.percentile(ratios, (10, 50, 90))
+    middle, low, high = spread(ratios)
     own = f"{contender.own} / {contender.nodes}" if contender.own else ""
     return [
         str(contender.lights),
@@ -253,7 +209,7 @@ def row(contender: Contender, base: Contender) -> list[str]:
 
 HEAD = """# What the node group holds and costs
 
-Generated by `tests/benchmarks/node_groups.py`; do not edit.
+{generated}
 
 The group in a material holds one branch per light that shines, as many table look-ups in it as
 there are different σ₀, and nodes for shadows only where shadows are on and the light casts one.
@@ -281,42 +237,38 @@ def page(found: Sequence[Contender]) -> str:
     """Write the page."""
     bases = {(c.lights, c.shadows): c for c in found if c.name == "Diffuse"}
 
-    def table(rows: Sequence[Contender]) -> list[str]:
-        lines = ["| " + " | ".join(TABLE) + " |", "|" + "---|" * len(TABLE)]
-        for contender in rows:
-            cells = row(contender, bases[contender.lights, contender.shadows])
-            lines.append("| " + " | ".join(cells) + " |")
-        return [*lines, ""]
+    def table_of(rows: Iterable[Contender]) -> list[str]:
+        return table(TABLE, [row(one, bases[one.lights, one.shadows]) for one in rows])
 
     def pick(lights: int, words: str) -> Contender:
         return next(c for c in found if c.lights == lights and words in c.name)
 
-    facts = ", ".join(f"{name} {value}" for name, value in machine().items())
-    lines = [HEAD.format(pixels=PIXELS, facts=facts)]
+    sentence = generated("node_groups")
+    lines = [HEAD.format(pixels=PIXELS, generated=sentence, facts=facts(machine()))]
     lines += ["## Examples", "", "(a) one sun, grey σ₀; (b) three lights, RGB σ₀, shadows"]
     lines += [
         "without and with coloured edges; (c) a world's picture only, RGB σ₀. Without lights the"
     ]
     lines += ["world's bands 0 to 2 are damped per channel, each with a look-up.", ""]
     examples = [pick(1, "grey"), pick(3, "RGB, shadows"), pick(3, "coloured"), pick(0, "RGB")]
-    lines += table(examples)
+    lines += table_of(examples)
     lines += ["## Goals", "", *goals(pick), ""]
     plain = [c for c in found if not c.shadows]
     lines += ["## By number of lights, without shadows", ""]
-    lines += table(sorted(plain, key=lambda c: c.lights))
+    lines += table_of(sorted(plain, key=lambda c: c.lights))
     lines += ["## With shadows", ""]
-    lines += table(sorted((c for c in found if c.shadows), key=lambda c: c.lights))
+    lines += table_of(sorted((c for c in found if c.shadows), key=lambda c: c.lights))
     return "\n".join(lines)
 
 
 def goals(pick: Callable[[int, str], Contender]) -> list[str]:
-    """Say which of the goals for the cost of a draw are met."""
-    told = []
+    """Return which of the goals for the cost of a draw are met."""
+    sentences = []
     for lights, most in ((1, 1.05), (4, 1.15)):
         base = np.array(pick(lights, "Diffuse").times)
         for words, what in (("RGB, no", "RGB, a look-up per channel"), ("profile", "RGB profile")):
-            low, middle, high = np.percentile(pick(lights, words).times / base, (10, 50, 90))
-            told.append(
+            middle, low, high = spread(pick(lights, words).times / base)
+            sentences.append(
                 f"- {lights} light{'s' * (lights > 1)}, {what}: {middle:.2f} × Diffuse "
                 f"({low:.2f} to {high:.2f}); at most {most}: {verdict(middle <= most)}."
             )
@@ -326,27 +278,29 @@ def goals(pick: Callable[[int, str], Contender]) -> list[str]:
             float(np.median(np.array(pick(lights, words).times) - glow))
             for words in ("RGB, no", "Principled")
         ]
-        told.append(
+        sentences.append(
             f"- Above plain Emission, {lights} light{'s' * (lights > 1)}: RGB {1e3 * above[0]:.0f} "
             f"ms, EEVEE's subsurface scattering {1e3 * above[1]:.0f} ms"
             + (f"; at most a tenth: {verdict(10.0 * above[0] <= above[1])}." * (lights == 1))
         )
     later = pick(4, "RGB, no").first - pick(4, "Diffuse").first
-    told.append(
+    sentences.append(
         f"- First draw, 4 lights, RGB: {later:+.1f} s against Diffuse; at most + 1 s: "
         f"{verdict(later <= 1.0)}."
     )
-    return told
+    return sentences
 
 
 def verdict(met: bool) -> str:
-    """In a word."""
+    """Return whether a goal is met, in a word."""
     return "met" if met else "**not met**"
 
 
 def main() -> None:
     """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--rounds", type=int, default=5)
     rounds = parser.parse_args().rounds
     register()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same shape at several resolutions: writes docs/results/resolution.md, .json and the picture.
+"""The same shape at several resolutions: docs/results/resolution.md, with a picture.
 
-    ./dev python tests/benchmarks/resolution.py [--levels 4]
+    ./dev bench resolution [--levels 4]
 
 The head is subdivided 0 to 4 times and rendered by EEVEE at one sigma0. What is compared is what
 the scattering adds to Lambert shading, so that the finer normals of a finer mesh do not count.
@@ -10,25 +10,23 @@ the scattering adds to Lambert shading, so that the finer normals of a finer mes
 from __future__ import annotations
 
 import argparse
-import json
 import platform
-import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+from rig import Rig, cdrf_node
 
-import bpy  # noqa: E402  (the checkout must be importable first)
-import numpy as np  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
-from rig import Rig, cdrf_node  # noqa: E402
+from cdrf_addon import ids, register, unregister
+from cdrf_addon.command import stage
+from cdrf_addon.core.curvature.scale_space import LEVELS
 
-from cdrf_addon import ids, register, unregister  # noqa: E402
-from cdrf_addon.command import stage  # noqa: E402
-from cdrf_addon.core.curvature.scale_space import LEVELS  # noqa: E402
+from .common.files import IMAGES, MESHES, write_page, write_results
+from .common.markdown import generated, table
+from .common.pictures import save_picture, side_by_side
 
-HEAD = ROOT / "tests" / "data" / "human_head.obj"
-DOCS = ROOT / "docs" / "results"
+HEAD = MESHES / "human_head.obj"
 RESOLUTION = 256
 # The head in metres: skin's red, green and blue.
 SCALE, SIGMA0, RATIO = 0.1, 0.006, (1.0, 0.35, 0.2)
@@ -38,29 +36,29 @@ Image = NDArray[np.float64]
 def render_level(level: int) -> dict[str, Image]:
     """Render the head subdivided so often: Lambert, kappa as measured, kappa diffused."""
     rig = Rig()
-    items = stage.import_mesh(HEAD, SCALE, level)
-    stage.light_and_frame(items)
+    objects = stage.import_mesh(HEAD, SCALE, level)
+    stage.light_and_frame(objects)
     scene = rig.scene
     scene.render.resolution_x = scene.render.resolution_y = RESOLUTION
     scene.view_settings.view_transform = "Raw"
     scene.eevee.taa_render_samples = 4
-    for item in bpy.data.objects:
-        if item.type == "LIGHT":
-            item.data.use_shadow = False
-    for item in items:
-        item.select_set(True)
+    for obj in bpy.data.objects:
+        if obj.type == "LIGHT":
+            obj.data.use_shadow = False
+    for obj in objects:
+        obj.select_set(True)
     bpy.context.view_layer.update()
     bpy.ops.cdrf.setup()
-    (item,) = items
-    material = item.data.materials[0]
+    (obj,) = objects
+    material = obj.data.materials[0]
     material.cdrf.sigma0_ratio = RATIO
-    cdrf_node(item).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
+    cdrf_node(obj).inputs[ids.BASE_COLOR].default_value = (1.0, 1.0, 1.0, 1.0)
     images: dict[str, Image] = {}
     material.cdrf.sigma0 = 0.0
     images["Lambert"] = rig.render()
     material.cdrf.sigma0 = SIGMA0
     images["diffused"] = rig.render()
-    mesh = item.data
+    mesh = obj.data
     colours = np.empty(4 * len(mesh.vertices), dtype=np.float32)
     mesh.attributes[ids.CURVATURE_ATTRIBUTE].data.foreach_get("color", colours)
     raw = np.repeat(colours.reshape(-1, 4)[:, :1], LEVELS, axis=1)
@@ -74,19 +72,19 @@ def render_level(level: int) -> dict[str, Image]:
 
 def compare(images: dict[int, dict[str, Image]]) -> list[dict[str, float]]:
     """RMS difference of each level to the finest, in units of the brightest white."""
-    finest = images[max(images)]
+    reference = images[max(images)]
     rows = []
     for level, one in images.items():
-        both = (one["Lambert"][..., 3] > 0.999) & (finest["Lambert"][..., 3] > 0.999)
+        both = (one["Lambert"][..., 3] > 0.999) & (reference["Lambert"][..., 3] > 0.999)
         row: dict[str, float] = {"level": level, "vertices": int(one["vertices"])}
-        peak = float(finest["Lambert"][both][:, :3].max())
+        peak = float(reference["Lambert"][both][:, :3].max())
 
         def rms(difference: Image, where: NDArray[np.bool_] = both, unit: float = peak) -> float:
             return float(np.sqrt((difference[where][:, :3] ** 2).mean())) / unit
 
-        row["Lambert"] = rms(one["Lambert"] - finest["Lambert"])
+        row["Lambert"] = rms(one["Lambert"] - reference["Lambert"])
         for kind in ("as measured", "diffused"):
-            added, final = (part[kind] - part["Lambert"] for part in (one, finest))
+            added, final = (part[kind] - part["Lambert"] for part in (one, reference))
             row[kind] = rms(added - final)
             row[f"{kind}, size"] = rms(added)
         rows.append(row)
@@ -99,7 +97,7 @@ def page(rows: list[dict[str, float]], facts: str) -> str:
     lines = [
         "# The same shape at any resolution",
         "",
-        "Generated by `tests/benchmarks/resolution.py`; do not edit.",
+        generated("resolution"),
         "",
         f"{facts} The human head at σ₀ = {SIGMA0 * 1e3:g} mm × (1, 0.35, 0.2), two suns, EEVEE,",
         f"{RESOLUTION} × {RESOLUTION} pixels. RMS difference to the finest mesh, in parts of the",
@@ -107,16 +105,15 @@ def page(rows: list[dict[str, float]], facts: str) -> str:
         "scattering adds to it, with κ as it is measured at the vertices and with κ diffused over",
         "the scatter distance, as it ships.",
         "",
-        "| level | vertices | Lambert | scattering, κ as measured | scattering, κ diffused |",
-        "|---|---|---|---|---|",
     ]
-    for row in rows:
-        lines.append(
-            f"| {row['level']} | {row['vertices']:,} | {row['Lambert']:.4f} | "
-            f"{row['as measured']:.4f} | {row['diffused']:.4f} |"
-        )
+    kinds = ("Lambert", "as measured", "diffused")
+    cells = [
+        [f"{row['level']}", f"{row['vertices']:,}", *(f"{row[kind]:.4f}" for kind in kinds)]
+        for row in rows
+    ]
+    head = ["level", "vertices", "Lambert", "scattering, κ as measured", "scattering, κ diffused"]
+    lines += table(head, cells)
     lines += [
-        "",
         f"The scattering itself has an RMS of {rows[-1]['as measured, size']:.4f} (as measured)",
         f"and {rows[-1]['diffused, size']:.4f} (diffused)",
         f"on the finest mesh. From {last['vertices']:,} to {rows[-1]['vertices']:,} vertices it "
@@ -130,22 +127,18 @@ def page(rows: list[dict[str, float]], facts: str) -> str:
     return "\n".join(lines)
 
 
-def save_picture(images: dict[int, dict[str, Image]], path: Path) -> None:
+def save_rows(images: dict[int, dict[str, Image]], path: Path) -> None:
     """Join all pictures, a row for each kind of kappa, a column for each level."""
     kinds = ("Lambert", "as measured", "diffused")
-    rows = [np.hstack([one[kind] for one in images.values()]) for kind in reversed(kinds)]
-    pixels = np.vstack(rows)
-    pixels = np.clip(pixels, 0.0, 1.0) ** (1.0 / 2.2)
-    pixels[..., 3] = 1.0
-    image = bpy.data.images.new("Resolution", pixels.shape[1], pixels.shape[0], is_data=True)
-    image.pixels.foreach_set(pixels.astype(np.float32).ravel())
-    image.filepath_raw, image.file_format = str(path), "PNG"
-    image.save()
+    rows = [side_by_side([one[kind] for one in images.values()]) for kind in reversed(kinds)]
+    save_picture(np.vstack(rows), path)
 
 
 def main() -> None:
     """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--levels", type=int, default=4)
     options = parser.parse_args()
     register()
@@ -153,11 +146,9 @@ def main() -> None:
         images = {level: render_level(level) for level in range(options.levels + 1)}
         rows = compare(images)
         facts = f"Blender {bpy.app.version_string}, {platform.machine()}, software rasteriser."
-        (DOCS / "resolution.md").write_text(page(rows, facts), encoding="utf-8")
-        (DOCS / "data" / "resolution.json").write_text(
-            json.dumps(rows, indent=1) + "\n", encoding="utf-8"
-        )
-        save_picture(images, DOCS / "images" / "resolution.png")
+        write_page("resolution", page(rows, facts))
+        write_results("resolution", rows)
+        save_rows(images, IMAGES / "resolution.png")
     finally:
         unregister()
 

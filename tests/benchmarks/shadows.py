@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cast shadows against Cycles, fingers held over a sphere and a head: writes results/shadows.md.
+"""Cast shadows against Cycles, fingers held over a sphere and a head: docs/results/shadows.md.
 
-    ./dev python tests/benchmarks/shadows.py [--dry]       about ten minutes
+    ./dev bench shadows [--dry]       about ten minutes
 
 Reference: Cycles, Random Walk, no light between surfaces. Scatter distances are
 those that Make Translucent reads from the same node; nothing is fitted.
@@ -11,26 +11,24 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-DOCS = ROOT / "docs" / "results"
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+from rig import Rig
 
-import bpy  # noqa: E402  (the checkout must be importable first)
-import numpy as np  # noqa: E402
-from machine import machine  # noqa: E402
-from mathutils import Vector  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
-from rig import Rig  # noqa: E402
+from cdrf_addon import register, unregister
+from cdrf_addon.compat import EEVEE, ensure_node_tree
 
-from cdrf_addon import register, unregister  # noqa: E402
-from cdrf_addon.compat import EEVEE, ensure_node_tree  # noqa: E402
+from .common.arrays import Array
+from .common.files import IMAGES, MESHES, ROOT, write_page
+from .common.machine import machine
+from .common.markdown import facts, generated, table
+from .common.pictures import save_picture, side_by_side
 
-Array = NDArray[np.float64]
 PIXELS = 128
 SAMPLES = 24
 CYCLES_SAMPLES = 128
@@ -50,7 +48,7 @@ class Scene:
     """A shape under fingers, ready to be rendered."""
 
     rig: Rig
-    item: bpy.types.Object
+    obj: bpy.types.Object
     suns: list[bpy.types.Object]
     scatter: bpy.types.ShaderNode
 
@@ -79,22 +77,22 @@ def make(shape: str, directions: Sequence[Sequence[float]]) -> Scene:
     bpy.context.view_layer.update()
     fingers(rig, Vector(directions[0]).normalized())
     if shape == "sphere":
-        item = rig.sphere()
+        obj = rig.sphere()
     else:
-        bpy.ops.wm.obj_import(filepath=str(ROOT / "tests" / "data" / "human_head.obj"))
-        item = bpy.context.object
-        item.modifiers.new("Subdivision", "SUBSURF").levels = 2
-        item.modifiers[0].render_levels = 2
+        bpy.ops.wm.obj_import(filepath=str(MESHES / "human_head.obj"))
+        obj = bpy.context.object
+        obj.modifiers.new("Subdivision", "SUBSURF").levels = 2
+        obj.modifiers[0].render_levels = 2
         bpy.ops.object.convert(target="MESH")
         bpy.ops.object.shade_smooth()
-        size = max(item.dimensions)
-        item.scale = [2.1 / size] * 3
+        size = max(obj.dimensions)
+        obj.scale = [2.1 / size] * 3
         bpy.ops.object.transform_apply(location=False, rotation=True, scale=True)
         bpy.ops.object.origin_set(type="ORIGIN_GEOMETRY", center="BOUNDS")
-        item.location = (0.0, 0.0, 0.0)
-    item.data.materials.clear()
-    material = bpy.data.materials.new("Wax")
-    item.data.materials.append(material)
+        obj.location = (0.0, 0.0, 0.0)
+    obj.data.materials.clear()
+    material = bpy.data.materials.new("Subsurface")
+    obj.data.materials.append(material)
     tree = ensure_node_tree(material)
     tree.nodes.clear()
     scatter = tree.nodes.new("ShaderNodeSubsurfaceScattering")
@@ -104,9 +102,9 @@ def make(shape: str, directions: Sequence[Sequence[float]]) -> Scene:
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(scatter.outputs["BSSRDF"], output.inputs["Surface"])
     bpy.ops.object.select_all(action="DESELECT")
-    item.select_set(True)
-    bpy.context.view_layer.objects.active = item
-    return Scene(rig, item, suns, scatter)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    return Scene(rig, obj, suns, scatter)
 
 
 def reference(scene: Scene) -> Array:
@@ -128,7 +126,7 @@ def ours(scene: Scene, shadows: str, edges: bool) -> Array:
     settings.render.engine = EEVEE
     settings.eevee.taa_render_samples = SAMPLES
     settings.render.filter_size = 1.5  # without a film filter every sample meets the same noise
-    material = scene.item.data.materials[0]
+    material = scene.obj.data.materials[0]
     material.cdrf.shadow_edges = edges
     material.cdrf.shadows = shadows
     bpy.context.view_layer.update()
@@ -140,25 +138,6 @@ def error(picture: Array, wanted: Array, covered: NDArray[np.bool_]) -> str:
     """RMS over pixels of R, G and B."""
     off = (picture - wanted)[covered][:, :3]
     return ", ".join(f"{value:.3f}" for value in np.sqrt((off**2).mean(axis=0)))
-
-
-def side_by_side(pictures: Sequence[Array]) -> Array:
-    """Pictures in a row, lightened for the eye."""
-    row = np.concatenate([picture[..., :3] for picture in pictures], axis=1)
-    return np.asarray(np.clip(row, 0.0, 1.0) ** (1.0 / 2.2))
-
-
-def save(picture: Array, path: Path) -> None:
-    """Write a picture, row 0 at the bottom, as a small PNG."""
-    height, width, _ = picture.shape
-    image = bpy.data.images.new("Row", width, height)
-    image.pixels.foreach_set(np.dstack((picture, np.ones((height, width)))).astype("f4").ravel())
-    scene = bpy.context.scene
-    scene.view_settings.view_transform = "Standard"  # as it is: the picture's values are sRGB
-    settings = scene.render.image_settings
-    settings.file_format, settings.color_mode, settings.color_depth = "PNG", "RGB", "8"
-    settings.compression = 100
-    image.save_render(str(path), scene=scene)
 
 
 def measure(cases: Sequence[str]) -> tuple[list[list[str]], dict[tuple[str, float], Array]]:
@@ -183,12 +162,12 @@ def measure(cases: Sequence[str]) -> tuple[list[list[str]], dict[tuple[str, floa
 
 HEAD = f"""# Cast shadows against path tracing
 
-Generated by `tests/benchmarks/shadows.py`; do not edit.
+{generated("shadows")}
 
 RMSE against Cycles (Random Walk, albedo {ALBEDO}, radius (1, 0.35, 0.2) · scale, no light between
-surfaces) over the visible skin, of red, green and blue, in units of a white surface facing the sun.
-The shapes are two units large; four cylinders are held in the sun's way like the fingers of a hand.
-The scatter distances are those the first press of the button reads from the node; nothing is
+surfaces) over the visible surface, of red, green and blue, in units of a white surface facing the
+sun. The shapes are two units large; four cylinders are held in the sun's way like the fingers of a
+hand. The scatter distances are those the first press of the button reads from the node; nothing is
 fitted. A second sun of half the strength comes from the other side.
 """
 LEGEND = "Cycles, without shadows, with shadows, with coloured edges"
@@ -196,7 +175,9 @@ LEGEND = "Cycles, without shadows, with shadows, with coloured edges"
 
 def main() -> None:
     """Measure, and write the page and its pictures."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--dry", action="store_true", help="print only, write nothing")
     chosen = parser.parse_args()
     register()
@@ -206,17 +187,13 @@ def main() -> None:
         unregister()
     if chosen.dry:
         return
-    facts = ", ".join(f"{name} {value}" for name, value in machine().items())
-    lines = [HEAD, f"Measured on: {facts}.", ""]
-    lines += [
-        "| shape | lights | scale | without shadows | with shadows | with coloured edges |",
-        "|---|---|---|---|---|---|",
-    ]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
-    lines += ["", f"![{LEGEND}](images/shadows.png)", "", f"{LEGEND}, in the order of the table."]
-    (DOCS / "shadows.md").write_text("\n".join(lines) + "\n")
-    save(np.concatenate(list(shown.values())[::-1]), DOCS / "images" / "shadows.png")
-    save(
+    lines = [HEAD, f"Measured on: {facts(machine())}.", ""]
+    head = ["shape", "lights", "scale", "without shadows", "with shadows", "with coloured edges"]
+    lines += table(head, rows)
+    lines += [f"![{LEGEND}](images/shadows.png)", "", f"{LEGEND}, in the order of the table."]
+    write_page("shadows", "\n".join(lines) + "\n")
+    save_picture(np.concatenate(list(shown.values())[::-1]), IMAGES / "shadows.png")
+    save_picture(
         shown[PORTRAIT].repeat(2, axis=0).repeat(2, axis=1),
         ROOT / "docs" / "guide" / "images" / "shadow_head.png",
     )

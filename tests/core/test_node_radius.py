@@ -60,7 +60,7 @@ def test_it_grows_with_the_albedo_and_is_clamped() -> None:
 
 
 def test_it_is_near_the_best_on_a_path_traced_head() -> None:
-    """If it fails: ./dev python tests/benchmarks/model_choice.py, then adapt node_radius.py."""
+    """On failure: ./dev bench model_choice, then core/scattering/node_radius.py."""
     rows = json.loads(STUDY.read_text())["albedos"]
     assert {row["albedo"] for row in rows} >= {0.5, 0.75, 0.9, 0.99}
     for row in rows:

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report import metrics, stability, texture_blurring
-from report.matrix import keep_pictures, load_pictures
-from report.settings import quick
-from report.substances import PRESET_OF, profile_of, substance
-from report.timing import split
 from stability import EXTREMES
 
 from cdrf_addon.core.reflectance.profile import SKIN_PROFILE
 from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
+from tests.benchmarks.report import metrics, stability, texture_blurring
+from tests.benchmarks.report.matrix import keep_pictures, load_pictures
+from tests.benchmarks.report.settings import quick
+from tests.benchmarks.report.substances import PRESET_OF, profile_of, substance
+from tests.benchmarks.report.timing import split
 
 TESTS = Path(__file__).resolve().parents[1]
 # Unit square in the plane z = 0, two triangles; texture coordinates are positions.
@@ -149,7 +149,8 @@ def test_rmse_is_the_mean_of_the_channels() -> None:
 
 
 def test_the_front_is_what_nothing_beats() -> None:
-    from report.figures import Point, front  # late: matplotlib is not in every environment
+    # Late: matplotlib is not in every environment.
+    from tests.benchmarks.report.figures.plots import Point, front
 
     places = [(1.0, 0.5), (2.0, 0.6), (3.0, 0.2), (0.5, 0.9), (3.5, 0.2)]
     found = front([Point("", "", "", 1, seconds, error) for seconds, error in places])
@@ -181,7 +182,7 @@ def test_results_that_were_broken_off_are_whole(tmp_path: Path) -> None:
     settings.write("errors", {"value": 1.23456789, "name": "σ₀"})
     found = settings.read("errors")
     assert (found["value"], found["name"]) == (1.23457, "σ₀")
-    assert [path.name for path in settings.data.iterdir()] == ["errors.json"]
+    assert [path.name for path in settings.data.iterdir()] == ["report_errors.json"]
 
 
 def test_every_extreme_names_a_test_that_exists() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 from numpy.typing import NDArray
+from pixels import read_pixels
 
 from cdrf_addon import compat, ids
 
@@ -51,10 +52,10 @@ class Rig:
         rotation: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> bpy.types.Object:
         """Add an object to the scene."""
-        item = bpy.data.objects.new(data.name if data else "Empty", data)
-        item.location, item.rotation_euler = location, rotation
-        self.scene.collection.objects.link(item)
-        return item
+        obj = bpy.data.objects.new(data.name if data else "Empty", data)
+        obj.location, obj.rotation_euler = location, rotation
+        self.scene.collection.objects.link(obj)
+        return obj
 
     def light(self, kind: str, *, name: str = "", **settings: Any) -> bpy.types.Object:
         """Add a light; `location` and `rotation` place it, the rest is set on the light."""
@@ -77,20 +78,15 @@ class Rig:
             path = Path(folder) / "frame.exr"
             self.scene.render.filepath = str(path)
             bpy.ops.render.render(write_still=True)
-            image = bpy.data.images.load(str(path))
-            pixels = np.empty(len(image.pixels), dtype=np.float32)
-            image.pixels.foreach_get(pixels)
-            width, height = image.size
-            bpy.data.images.remove(image)
-        return pixels.reshape(height, width, 4).astype(np.float64)
+            return read_pixels(path)
 
     def render_exact(
-        self, item: bpy.types.Object, socket: str, low: float, high: float
+        self, obj: bpy.types.Object, socket: str, low: float, high: float
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Render a colour or vector to about 1e-6 of its range, past the half-float film.
 
         Args:
-            item: The object whose first material is replaced meanwhile.
+            obj: The object whose first material is replaced meanwhile.
             socket: "Normal", "Position" (of the geometry) or "Shader" (of its material).
             low: Lower end of the values.
             high: Upper end of the values.
@@ -98,7 +94,7 @@ class Rig:
         Returns:
             (height, width, 3) values, and the pixels the object covers wholly.
         """
-        kept = item.data.materials[0] if item.data.materials else None
+        kept = obj.data.materials[0] if obj.data.materials else None
         parts = []
         for operation in ("FLOOR", "FRACTION"):
             material = (
@@ -121,22 +117,22 @@ class Rig:
                 tree.nodes.remove(output)
             output = tree.nodes.new("ShaderNodeOutputMaterial")
             tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
-            if item.data.materials:
-                item.data.materials[0] = material
+            if obj.data.materials:
+                obj.data.materials[0] = material
             else:
-                item.data.materials.append(material)
+                obj.data.materials.append(material)
             parts.append(self.render())
-            item.data.materials[0] = kept
+            obj.data.materials[0] = kept
             bpy.data.materials.remove(material)
         if kept is None:
-            item.data.materials.clear()
+            obj.data.materials.clear()
         covered = parts[0][..., 3] > 0.999
         return (parts[0] + parts[1])[..., :3] / SPLIT * (high - low) + low, covered
 
-    def normals(self, item: bpy.types.Object) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def normals(self, obj: bpy.types.Object) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Normals the shader sees, unit length, and the pixels the object covers."""
         # A little beyond 1, so that rounding never reaches the next integer of the floor.
-        normals, covered = self.render_exact(item, "Normal", -1.01, 1.01)
+        normals, covered = self.render_exact(obj, "Normal", -1.01, 1.01)
         length = np.linalg.norm(normals, axis=-1, keepdims=True)
         return normals / np.where(length > 0.0, length, 1.0), covered
 
@@ -163,6 +159,6 @@ def diffuse_material(colour: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> bp
     return material
 
 
-def cdrf_node(item: bpy.types.Object) -> bpy.types.ShaderNode:
+def cdrf_node(obj: bpy.types.Object) -> bpy.types.ShaderNode:
     """The CDRF node of an object's first material."""
-    return item.data.materials[0].node_tree.nodes[ids.NODE]
+    return obj.data.materials[0].node_tree.nodes[ids.NODE]

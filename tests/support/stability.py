@@ -2,7 +2,7 @@
 """Which tests try what is stiff or extreme, and the guard in the code that holds it.
 
 `pytest -m stability --stability FILE` runs them and writes what came out; the report makes
-docs/results/stability.md of that file, so that the page tells of a run and not of an intention.
+docs/results/stability.md of that file, so that the page reports a run, not an intention.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Extreme:
 SIGMA, MESHES, KAPPA = "σ: widths of the blur", "Meshes", "κ: curvature"
 LIGHTS, UNITS, TABLES = "Lights and worlds", "Units and sizes", "Tables and measurements"
 CLOSED = "the closed forms change over to a series; arguments are checked at the door"
-CLEAN = "core/curvature/clean.py welds, filters, orients and normalises before any estimate"
+CLEAN = "core/curvature welds, filters, orients and normalises before any estimate"
 NODES = "nodes clamp what they divide by and what they look up"
 
 EXTREMES = (
@@ -98,7 +98,7 @@ EXTREMES = (
             "conjugate gradients start from the field itself"),
     Extreme(KAPPA, "core/test_field.py::test_pieces_too_small_for_a_fit",
             "pieces with fewer vertices than a fit needs", "filled in from their neighbours",
-            "estimators say where they have nothing to say"),
+            "estimators mark where they have no value"),
     Extreme(KAPPA, "core/test_field.py::test_a_hub_of_5000_edges_is_quick",
             "a vertex with 5,000 edges", "done in seconds", "rings have a largest size"),
     Extreme(MESHES, "core/test_crash_list.py::test_no_crash_no_hang_no_nonsense",
@@ -138,7 +138,7 @@ EXTREMES = (
     Extreme(LIGHTS, "render/test_ambient.py::test_no_node_for_a_black_or_missing_world",
             "no world, and a black one", "no node, no error", "a world is wired only if it shines"),
     Extreme(LIGHTS, "render/test_shadows.py::test_four_lights_share_a_mask",
-            "four casting lights, which no normal tells apart", "one shared mask, within its bound",
+            "four casting lights, which no normal separates", "one shared mask, within its bound",
             "decision 11"),
     Extreme(UNITS, "blender/test_models.py::test_presets_are_millimetres_in_the_scenes_units",
             "scenes in metres, centimetres and without units", "the same millimetres",
@@ -181,18 +181,18 @@ class Collector:
         function = nodeid.rpartition("::")[2].partition("[")[0]
         return by_test().get(f"{path.relative_to(self._tests).as_posix()}::{function}")
 
-    def add(self, extreme: Extreme, nodeid: str, outcome: str, seconds: float, said: str) -> None:
+    def add(self, extreme: Extreme, nodeid: str, outcome: str, seconds: float, values: str) -> None:
         """Note one case."""
         row = self._found.setdefault(extreme.test, asdict(extreme) | {"cases": []})
         case = nodeid.partition("[")[2].rstrip("]")
-        known = {"case": case, "outcome": outcome, "seconds": round(seconds, 2), "said": said}
+        known = {"case": case, "outcome": outcome, "seconds": round(seconds, 2), "said": values}
         row["cases"].append(known)
 
     def write(self, path: Path, facts: dict[str, str]) -> None:
         """Write everything as JSON."""
         ordered = [self._found[one.test] for one in EXTREMES if one.test in self._found]
         missing = [one.test for one in EXTREMES if one.test not in self._found]
-        told = {"date": time.strftime("%Y-%m-%d"), "machine": facts, "tests": ordered,
+        results = {"date": time.strftime("%Y-%m-%d"), "machine": facts, "tests": ordered,
                 "not run": missing}  # fmt: skip
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -19,7 +19,9 @@ WRITTEN = Bound(
     1e-3, 2e-4, "the film is half float: 4.9e-4 at values over 1/2, and it truncates (mean -1.6e-4)"
 )
 SHADER = Bound(
-    1e-4, 3e-5, "bilinear look-up: 6.5e-5 in the ideal (core/lut.py), float32 arithmetic 1e-6"
+    1e-4,
+    3e-5,
+    "bilinear look-up: 6.5e-5 in the ideal (core/reflectance/lut.py), float32 arithmetic 1e-6",
 )
 FOUR_LIGHTS = Bound(
     1e-3,
@@ -30,7 +32,7 @@ DIFFUSE = Bound(
     5e-3, 2e-3, "the issue's 0.5 %; the sphere light's fit takes 0.4 % of it at 46 degrees"
 )
 # EEVEE's own table of the horizon leaves 0.8 % of the peak at N.L = 0 for a light without size
-# (64 texels over N.L in [-1, 1]); a pixel that close to the terminator says nothing about ours.
+# (64 texels over N.L in [-1, 1]); a pixel that close to the terminator shows nothing of ours.
 DIFFUSE_TERMINATOR = 0.01
 DIFFUSE_AT_TERMINATOR = Bound(9e-3, 9e-3, "EEVEE's table: half a texel of 1/63 at N.L = 0")
 WORLD_CYCLES = Bound(

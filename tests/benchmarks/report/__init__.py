@@ -1,4 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The report: error against run time, beside what an artist would pick instead."""
-
-import bpy  # noqa: F401  (bmesh is only there after it)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes results/report.md and results/stability.md, pictures and raw results in results/report/.
+"""Writes docs/results/report.md and stability.md, pictures in report/, raw results in data/.
 
-    ./dev python tests/benchmarks/report                  everything, from nothing: many hours
-    ./dev python tests/benchmarks/report --missing        what is not there yet
-    ./dev python tests/benchmarks/report --sample --docs output/sample         a few minutes
-    ./dev python tests/benchmarks/report --timing         the times, anew: on a quiet machine
-    ./dev python tests/benchmarks/report --timing --missing       rounds that are not there yet
-    ./dev python tests/benchmarks/report --only page      figures and pages from the raw results
+    ./dev bench report                  everything, from nothing: many hours
+    ./dev bench report --missing        what is not there yet
+    ./dev bench report --sample --docs output/sample         a few minutes
+    ./dev bench report --timing         the times, anew: on a quiet machine
+    ./dev bench report --timing --missing       rounds that are not there yet
+    ./dev bench report --only page      figures and pages from the raw results
 
 Stages are paper, errors, timing, stability and page. References are kept by their parameters in the
 folder given by --cache and used again. Every result is kept as soon as it is there, so the command
@@ -17,20 +17,18 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[3]
-BENCHMARKS = ROOT / "tests" / "benchmarks"
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support"), str(BENCHMARKS)]
+from ..common.files import RESULTS, ROOT
+
 STAGES = ("paper", "errors", "timing", "stability", "page")
 
 
 def parse() -> argparse.Namespace:
     """Read the command line."""
     plain = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(prog="report", description=__doc__, formatter_class=plain)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=plain)
     add = parser.add_argument
     add("--sample", action="store_true", help="a quick sample, into --docs")
     add("--missing", action="store_true", help="leave alone what is there")
@@ -41,7 +39,7 @@ def parse() -> argparse.Namespace:
     add("--cells", nargs="+", default=["*"], help="patterns of scenes, such as 'head, *'")
     add("--contenders", nargs="+", default=["*"], help="patterns of contenders' names")
     add("--minutes", type=float, default=float("inf"), help="begin nothing new after so long")
-    add("--docs", type=Path, default=None, help="folder of the pages (default: docs)")
+    add("--docs", type=Path, default=None, help="folder of the pages (default: docs/results)")
     add("--cache", type=Path, default=ROOT / "output" / "report", help="folder of references")
     return parser.parse_args()
 
@@ -55,12 +53,12 @@ def main() -> None:
     import bpy  # noqa: F401  (must come before anything that needs it, after the folder is set)
 
     from cdrf_addon import register, unregister
-    from report import figures, matrix, page, paper, settings, stability, timing
+
+    from . import matrix, page, paper, settings, stability, timing
+    from .figures.draw import draw_all
 
     make = settings.quick if chosen.sample else settings.full
-    docs = chosen.docs or (
-        ROOT / "output" / "sample" if chosen.sample else ROOT / "docs" / "results"
-    )
+    docs = chosen.docs or (ROOT / "output" / "sample" if chosen.sample else RESULTS)
     here = make(docs.resolve(), cache)
     stages = ["timing"] if chosen.timing else chosen.only or list(STAGES)
     deadline = time.monotonic() + 60.0 * chosen.minutes
@@ -78,11 +76,11 @@ def main() -> None:
         if "timing" in stages:
             parts = chosen.parts or list(timing.PARTS)
             if not chosen.missing:
-                timing.forget(here, parts)
+                timing.discard(here, parts)
             timing.run(here, chosen.rounds or here.rounds, parts, deadline)
         if "stability" in stages and time.monotonic() < deadline:
             stability.run(here)
-        figures.draw_all(here)
+        draw_all(here)
         stability.write(here)
         page.write(here)
     finally:

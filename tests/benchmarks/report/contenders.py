@@ -15,18 +15,19 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
+from pixels import pixels_of
 
 from cdrf_addon import ids
 from cdrf_addon.core.curvature.summary import CONSTANT
 from cdrf_addon.core.reflectance.environment import lit_by, project, reduce_picture
 
+from ..common.arrays import Array
 from . import texture_blurring
-from .scenes import Stage, directions
+from .lights import directions
 from .settings import SEED
+from .stage import Stage
 from .substances import profile_of
 
-Array = NDArray[np.float64]
 Render = Callable[[int], Array]
 
 EEVEE, CYCLES, NUMPY = "EEVEE", "Cycles", "NumPy"
@@ -61,7 +62,7 @@ class Contender:
 
 @contextmanager
 def _plain(stage: Stage, material: str) -> Iterator[Render]:
-    stage.wear(getattr(stage, material))
+    stage.assign(getattr(stage, material))
     yield stage.eevee
 
 
@@ -72,9 +73,9 @@ def _unshadowed(stage: Stage) -> Iterator[Render]:
 
 
 @contextmanager
-def _bare_wax(stage: Stage) -> Iterator[None]:
+def _without_cdrf(stage: Stage) -> Iterator[None]:
     """Take CDRF off the scattering material meanwhile, so that EEVEE shows the node itself."""
-    stage.wear(stage.wax)
+    stage.assign(stage.scattering)
     if bpy.ops.cdrf.remove.poll():
         bpy.ops.cdrf.remove()
     yield
@@ -82,13 +83,13 @@ def _bare_wax(stage: Stage) -> Iterator[None]:
 
 @contextmanager
 def _node(stage: Stage) -> Iterator[Render]:
-    with _bare_wax(stage):
+    with _without_cdrf(stage):
         yield stage.eevee
 
 
 @contextmanager
 def _cycles(stage: Stage, *, denoise: bool = False) -> Iterator[Render]:
-    with _bare_wax(stage):
+    with _without_cdrf(stage):
         yield lambda samples: stage.cycles(samples, OWN_SEED, denoise=denoise)
 
 
@@ -115,8 +116,8 @@ def cdrf(
         raw: Curvature as it is measured at each vertex, not at the length light diffuses over.
         occlusion: Ambient occlusion of the world's light.
     """
-    stage.wear(stage.wax)
-    settings = stage.wax.cdrf
+    stage.assign(stage.scattering)
+    settings = stage.scattering.cdrf
     settings.shadow_edges, settings.ambient_occlusion = edges, occlusion
     settings.shadows = "ON" if shadows else "OFF"
     assert bpy.ops.cdrf.setup() == {"FINISHED"}
@@ -134,7 +135,7 @@ def cdrf(
     bpy.context.view_layer.update()
     with (
         nullcontext() if shadows else stage.without_shadows(),
-        _raw_curvature(stage.item.data) if raw else nullcontext(),
+        _raw_curvature(stage.obj.data) if raw else nullcontext(),
     ):
         yield stage.eevee
 
@@ -195,14 +196,11 @@ def _world_light(stage: Stage) -> Callable[[Array], Array]:
     nodes = stage.scene.world.node_tree.nodes
     factor = float(nodes["Background"].inputs["Strength"].default_value)
     picture = next(node.image for node in nodes if node.type == "TEX_ENVIRONMENT")
-    width, height = picture.size
-    pixels = np.empty(4 * width * height, dtype=np.float32)
-    picture.pixels.foreach_get(pixels)
-    small = reduce_picture(pixels.reshape(height, width, 4)[..., :3], 64, 128)
+    small = reduce_picture(pixels_of(picture)[..., :3].astype(np.float32), 64, 128)
     harmonics = factor * project(small).harmonics
 
     def arriving(normals: Array) -> Array:
-        # Blender's pictures have +X in their middle, those of core/ambient.py +Y.
+        # Blender's pictures have +X in their middle, those of core/reflectance/environment.py +Y.
         x, y, z = normals.T
         return lit_by(harmonics, np.stack((-y, x, z), axis=1), np.ones((3, 3)))
 
@@ -247,13 +245,13 @@ def _one_lamp(stage: Stage) -> str:
 
 
 def _varying(stage: Stage) -> str:
-    if stage.item.data.cdrf.kind == CONSTANT or stage.cell.shape == "sphere":
+    if stage.obj.data.cdrf.kind == CONSTANT or stage.cell.shape == "sphere":
         return "its curvature is the same everywhere"
     return ""
 
 
 def _unwrapped(stage: Stage) -> str:
-    return "" if stage.item.data.uv_layers else "it has no UV map"
+    return "" if stage.obj.data.uv_layers else "it has no UV map"
 
 
 LAMBERT = "Lambert (Diffuse BSDF)"

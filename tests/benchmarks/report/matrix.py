@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from machine import machine
 from numpy.typing import NDArray
-from run import peak_megabytes, reset_peak
 
+from ..common.arrays import Array, Mask
+from ..common.machine import machine
+from ..common.memory import peak_megabytes, reset_peak
+from .cells import CELLS, FIRST, Cell
 from .contenders import (
     CONTENDERS,
     DEFAULT,
@@ -25,11 +27,8 @@ from .contenders import (
 )
 from .metrics import rmse, ssim
 from .reference import Reference, reference
-from .scenes import CELLS, FIRST, Cell, Stage
 from .settings import Settings
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from .stage import Stage
 
 SAMPLE_CELLS = [Cell("torus", "milk", "sun"), Cell("head", "skin", "sun")]
 BOUNCES = 12
@@ -134,7 +133,7 @@ def _measure_cell(
 
 def describe(known: dict[str, Any], stage: Stage, truth: Reference, masks: dict[str, Mask]) -> None:
     """Facts of a cell."""
-    known["vertices"] = len(stage.item.data.vertices)
+    known["vertices"] = len(stage.obj.data.vertices)
     known["pixels"] = {name: int(mask.sum()) for name, mask in masks.items()}
     known["floor"] = {name: truth.floor(mask) for name, mask in masks.items()}
     known["mean"] = float(truth.picture[masks["all"]][:, :3].mean())

@@ -4,13 +4,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from cdrf_addon.core.colour_scale import srgb
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from ..common.arrays import Array, Mask
 
 # Wang, Bovik, Sheikh and Simoncelli 2004: 11 x 11 Gaussian window, constants for a range of 1.
 WINDOW, REACH = 1.5, 5

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..common.markdown import table
+from ..common.timing import spread
 from .contenders import DEFAULT, LAMBERT, SHADOWS, TEXTURE
-from .results import Results, table, with_spread
-from .scenes import FIGURINE, HEAD
+from .results import Results, with_spread
+from .shapes import FIGURINE, HEAD
 from .substances import PRESET_OF
-from .timing import spread
 
 # What the paper says: look-ups, "a few" operations, "almost" the cost, times faster.
 LOOK_UPS, FEW_NODES, ALMOST, FASTER = 3, 20, 1.25, 10.0
@@ -148,9 +149,9 @@ def _closest(errors: Mapping[str, float], words: str) -> list[str]:
     """Errors of a figure's contenders, and the least."""
     if not errors:
         return []
-    told = ", ".join(f"{name} {value:.4f}" for name, value in errors.items())
+    phrases = ", ".join(f"{name} {value:.4f}" for name, value in errors.items())
     best = min(errors, key=lambda name: errors[name])
-    return [f"{words}: {told}. Closest: {best}.", ""]
+    return [f"{words}: {phrases}. Closest: {best}.", ""]
 
 
 def _claims_part(results: Results) -> list[str]:
@@ -216,7 +217,7 @@ def claim_sentences(results: Results) -> list[str]:
         f"pixels in NumPy, {with_spread(over, 0)} times; by reads "
         f"{work['taps'] / work['look-ups']:.0f} times: {texel:g} a texel against {pixel:g} a "
         f"pixel, so it holds while the picture shows fewer than {texel / pixel / FASTER:.1f} "
-        "pixels of skin for a texel of it."
+        "pixels of the surface for a texel of it."
     )
     bare = claims["without UV"]
     verdict = (

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from ..common.markdown import table
+from ..common.timing import spread
 from .contenders import DEFAULT
-from .results import DASH, Results, table, with_spread
-from .timing import PARTS, base_of, power, split, spread
+from .results import DASH, Results, with_spread
+from .timing import PARTS, base_of, power, split
 
 
 def timing_part(results: Results) -> list[str]:
@@ -99,7 +101,7 @@ def _scaling(results: Results) -> list[str]:
         ("vertices", "vertices", 1),
     ):
         rows = results.timing.get(part, {}).get("rows", {})
-        told = []
+        phrases = []
         for name, points in rows.items():
             sizes = sorted(int(size) for size in points if size.isdigit())
             if len(sizes) < 2:
@@ -108,12 +110,12 @@ def _scaling(results: Results) -> list[str]:
                 (float(size**power_of), spread(one["wall"] for one in points[str(size)])[0])
                 for size in sizes
             ]
-            told.append(
+            phrases.append(
                 f"{name} {ends[-1][1] / ends[0][1]:.2f} times from {sizes[0]:,} to "
                 f"{sizes[-1]:,} (exponent {power(ends):.2f} at the end)"
             )
-        if told:
-            lines += [f"Cost over {words}, without shadows: " + "; ".join(told) + ".", ""]
+        if phrases:
+            lines += [f"Cost over {words}, without shadows: " + "; ".join(phrases) + ".", ""]
     return lines
 
 
@@ -122,13 +124,15 @@ def _preparation(results: Results) -> list[str]:
     if not part.get("rounds"):
         return []
     rows = part["rows"]
-    told = [f"*Make Translucent* {with_spread([one['wall'] for one in rows[DEFAULT]['setup']])} s"]
+    phrases = [
+        f"*Make Translucent* {with_spread([one['wall'] for one in rows[DEFAULT]['setup']])} s"
+    ]
     if "CDRF measured" in rows:
         measured = [one["wall"] for one in rows["CDRF measured"]["measure"]]
-        told.append(f"*Measure* {with_spread(measured, 0)} s more")
+        phrases.append(f"*Measure* {with_spread(measured, 0)} s more")
     return [
         f"**Preparation** of {part['cell']}, {part['vertices']:,} vertices: "
-        + ", ".join(told)
+        + ", ".join(phrases)
         + ". Lambert, EEVEE's scattering and Cycles need none; texture "
         "blurring needs UVs, which somebody has to unwrap.",
         "",

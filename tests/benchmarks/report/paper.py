@@ -10,7 +10,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from machine import machine
 from mathutils import Vector
 from numpy.typing import NDArray
 
@@ -23,25 +22,28 @@ from cdrf_addon.core.reflectance.model import sphere
 from cdrf_addon.measuring.figure import draw_fit
 from cdrf_addon.measuring.process import measure as measure_spheres
 from cdrf_addon.measuring.request import Request
-from node_groups import kinds
 
+from ..common.arrays import Array
+from ..common.draws import node_types
+from ..common.machine import machine
+from ..common.timing import interleaved
 from . import texture_blurring
+from .cells import Cell
 from .contenders import cdrf, lighting
+from .lights import directions
 from .matrix import keep_pictures, load_pictures, pictures_path
 from .metrics import rmse
 from .reference import kept
-from .scenes import COVERED, Cell, Stage, directions
 from .settings import SEED, Settings
+from .stage import COVERED, Stage
 from .substances import profile_of
-
-Array = NDArray[np.float64]
 
 HEAD = Cell("head", "skin", "sun")
 STATUE = Cell("turned head", "skin", "sun")
 RADII = (0.02, 0.06, 0.2, 0.6)
 """Red's scatter radius over the sphere's, of the spheres that are shown."""
 FIT_SCALES = (0.03, 0.09, 0.25, 0.7)
-"""The same, of the spheres whose fits are told; the nearest that was measured."""
+"""The same, of the spheres whose fits are reported; the nearest that was measured."""
 REPEATS = 5
 
 
@@ -99,7 +101,7 @@ def _wireframe(stage: Stage) -> Array:
     tree.links.new(colour, glow.inputs["Color"])
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(glow.outputs["Emission"], output.inputs["Surface"])
-    stage.wear(material)
+    stage.assign(material)
     return stage.eevee(stage.settings.film)
 
 
@@ -118,8 +120,8 @@ def _figure_1_and_3(settings: Settings) -> dict[str, Any]:
     stage = Stage(HEAD, settings, settings.large)
     pictures["Path tracing"] = path_traced(stage, settings.samples // 4)
     pictures["curvature"] = curvature_picture(stage)
-    known = stage.item.data.cdrf
-    stage.wear(stage.opaque)
+    known = stage.obj.data.cdrf
+    stage.assign(stage.opaque)
     pictures["Lambert"] = stage.eevee(settings.film)
     with cdrf(stage, shadows=True) as render:
         pictures["CDRF, shadows"] = render(settings.film)
@@ -141,7 +143,7 @@ def _figure_1_and_3(settings: Settings) -> dict[str, Any]:
         "curvature": range_of,
         "texture cost": asdict(cost),
         "sigma0 mm": list(stage.substance.preset.sigma0),
-        "vertices": len(stage.item.data.vertices),
+        "vertices": len(stage.obj.data.vertices),
     }
 
 
@@ -153,7 +155,7 @@ def _figure_2(settings: Settings) -> dict[str, Any]:
     albedo = stage.substance.albedo
     ratio = stage.substance.radius(1.0)
     ratio /= ratio.max()
-    scatter = next(n for n in stage.wax.node_tree.nodes if n.type == "SUBSURFACE_SCATTERING")
+    scatter = next(n for n in stage.scattering.node_tree.nodes if n.type == "SUBSURFACE_SCATTERING")
     turn = Vector((1.0, 0.0, 0.0)).to_track_quat("Z", "Y").to_euler()
     stage.lights[0].rotation_euler = turn
     radius = float(np.abs(stage.geometry.shape.vertices).max())
@@ -167,8 +169,8 @@ def _figure_2(settings: Settings) -> dict[str, Any]:
     fitted = fit_material(spheres)
     shape = (float(ratio[0]), float(ratio[1]), float(ratio[2]))
     model = MeasuredModel(spheres, shape)
-    settings.data.mkdir(parents=True, exist_ok=True)
-    draw_fit(model, fitted, settings.data / "figure2_fit.png")
+    settings.pictures.mkdir(parents=True, exist_ok=True)
+    draw_fit(model, fitted, settings.pictures / "figure2_fit.png")
     rows = []
     for wanted in FIT_SCALES:
         for channel, one in enumerate(fitted.channels):
@@ -190,7 +192,7 @@ def _figure_2(settings: Settings) -> dict[str, Any]:
 def _figure_4(settings: Settings) -> dict[str, Any]:
     stage = Stage(STATUE, settings, settings.large)
     pictures = {"Path tracing": path_traced(stage, settings.samples // 4)}
-    stage.wear(stage.opaque)
+    stage.assign(stage.opaque)
     pictures["Lambert"] = stage.eevee(settings.film)
     for name, arguments in (
         ("CDRF ring (the paper)", {"model": "RING", "raw": True}),
@@ -222,12 +224,12 @@ def _nodes(settings: Settings) -> dict[str, dict[str, int]]:
     """Nodes and look-ups of the materials under one sun."""
     stage = Stage(replace(HEAD), settings)
     found = {}
-    for name, make in (("3 colours", stage.wax), ("grey", stage.wax)):
+    for name, make in (("3 colours", stage.scattering), ("grey", stage.scattering)):
         with cdrf(stage):
             if name == "grey":
                 make.cdrf.sigma0_ratio = (1.0, 1.0, 1.0)
             tree = make.node_tree.nodes[ids.NODE].node_tree
-            inside = kinds(tree)
+            inside = node_types(tree)
             found[name] = {"nodes": len(inside), "look-ups": inside.count("TEX_IMAGE")}
     return found
 
@@ -271,12 +273,7 @@ def _arithmetic(settings: Settings) -> dict[str, Any]:
     calls: dict[str, Callable[[], Array]] = {
         "Lambert": lambert, "CDRF": curved, "Texture blurring": blurred
     }  # fmt: skip
-    seconds: dict[str, list[float]] = {name: [] for name in calls}
-    for _ in range(REPEATS):
-        for name, call in calls.items():
-            start = time.process_time()
-            call()
-            seconds[name].append(time.process_time() - start)
+    seconds = interleaved(calls, REPEATS)
     return {"seconds": seconds, "pixels": len(hits.pixel), "texels": cost.texels,
             "passes": cost.passes, "taps": cost.taps, "look-ups": 3 * len(hits.pixel),
             "atlas": settings.atlas}  # fmt: skip
@@ -284,7 +281,7 @@ def _arithmetic(settings: Settings) -> dict[str, Any]:
 
 def _diffused(stage: Stage) -> Array:
     """Curvature at the pixels, at the length of the widest channel's nearest level."""
-    data = stage.item.data.attributes[ids.DIFFUSED_ATTRIBUTE].data
+    data = stage.obj.data.attributes[ids.DIFFUSED_ATTRIBUTE].data
     values = np.empty(4 * len(data), dtype=np.float32)
     data.foreach_get("color", values)
     geometry = stage.geometry
@@ -295,12 +292,12 @@ def _diffused(stage: Stage) -> Array:
 def _without_uv(settings: Settings) -> dict[str, Any]:
     """Make a mesh without UVs translucent, and look whether light bleeds over its terminator."""
     stage = Stage(Cell("bunny", "milk", "sun"), settings)
-    mesh = stage.item.data
+    mesh = stage.obj.data
     while mesh.uv_layers:
         mesh.uv_layers.remove(mesh.uv_layers[0])
     with cdrf(stage) as render:
         soft = render(1)
-    stage.wear(stage.opaque)
+    stage.assign(stage.opaque)
     with stage.without_shadows():
         hard = stage.eevee(1)
     covered = (soft[..., 3] > COVERED) & (hard[..., 3] > COVERED)

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
-from .metrics import Mask, rmse
-from .scenes import FIRST, Cell, Stage
+from ..common.arrays import Array, Mask
+from .cells import FIRST, Cell
+from .metrics import rmse
 from .settings import SEED, Settings
+from .stage import Stage
 
-Array = NDArray[np.float64]
 VERSION = 1
 """Raise it when a scene, a shape or a light of scenes.py changes."""
 
@@ -66,7 +66,7 @@ def reference(stage: Stage, bounces: int = 0) -> Reference:
     """Path-trace a stage in its scattering material, or take it from the cache."""
     settings = stage.settings
     samples = paths(settings, stage.cell)
-    stage.wear(stage.wax)
+    stage.assign(stage.scattering)
     pictures, seconds = [], 0.0
     for seed in (SEED, SEED + 1):
         key = [asdict(stage.cell), stage.size, samples, settings.level, seed, bounces]

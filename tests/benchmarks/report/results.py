@@ -3,25 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
+from ..common.timing import spread
 from .matrix import measured_cells
 from .settings import Settings
-from .timing import base_of, ratios, spread
+from .timing import base_of, ratios
 
 DASH = "–"
 FEW = 5
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """A Markdown table."""
-    return [
-        "| " + " | ".join(head) + " |",
-        "|" + "---|" * len(head),
-        *("| " + " | ".join(row) + " |" for row in rows),
-        "",
-    ]
 
 
 def with_spread(values: Sequence[float], digits: int = 2) -> str:
@@ -34,11 +24,6 @@ def with_spread(values: Sequence[float], digits: int = 2) -> str:
     if len(values) == 1:
         return f"{middle:.{digits}f} (one run)"
     return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
-
-
-def facts(results: Mapping[str, Any]) -> str:
-    """What it was measured on."""
-    return ", ".join(f"{name} {value}" for name, value in results["machine"].items())
 
 
 class Results:
@@ -54,7 +39,7 @@ class Results:
 
     def image(self, name: str, text: str) -> list[str]:
         """A picture, if it was drawn."""
-        return [f"![{text}](report/{name})", ""] if (self.settings.data / name).exists() else []
+        return [f"![{text}](report/{name})", ""] if (self.settings.pictures / name).exists() else []
 
     def ratio(
         self, part: str, name: str, point: str, clock: str = "wall", base: str = ""

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..common.files import rounded
+
 SEED = 20111106
 """Of everything random; the second picture of a reference takes the next number."""
 
@@ -18,15 +20,15 @@ class Settings:
     """One way of running the report.
 
     Attributes:
-        docs: Folder of the pages; pictures and raw results go to `report` in it.
+        docs: Folder of the pages; pictures go to `report` in it, raw results to `data`.
         cache: References and path-traced spheres, by their parameters.
         size: Pixels of the matrix, each way.
         large: Pixels of the pictures of the paper's figures.
         samples: Paths through a pixel in each of the two pictures of a reference.
-        film: EEVEE samples where nothing else is said.
+        film: EEVEE samples by default.
         level: Subdivisions of the shapes.
         atlas: Texels of texture blurring, each way.
-        quality: Of measured spheres (cdrf_addon/measure.py).
+        quality: Of measured spheres (cdrf_addon/measuring).
         timed: EEVEE samples that are timed, then Cycles'.
         rounds: Times that each timing is repeated.
         sample: Whether this is the quick sample.
@@ -47,34 +49,36 @@ class Settings:
 
     @property
     def data(self) -> Path:
-        """Folder of pictures and raw results."""
+        """Folder of raw results."""
+        return self.docs / "data"
+
+    @property
+    def pictures(self) -> Path:
+        """Folder of pictures and plots."""
         return self.docs / "report"
+
+    def file_of(self, name: str) -> Path:
+        """Return the file of a stage's raw results."""
+        return self.data / f"report_{name}.json"
 
     def read(self, name: str) -> dict[str, Any]:
         """Raw results of a stage; empty if it has not run."""
-        path = self.data / f"{name}.json"
-        found: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
+        path = self.file_of(name)
+        found: dict[str, Any] = (
+            json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+        )
         return found
 
     def write(self, name: str, results: dict[str, Any]) -> None:
         """Keep the raw results of a stage, dated."""
         self.data.mkdir(parents=True, exist_ok=True)
         results["date"] = time.strftime("%Y-%m-%d")
-        text = json.dumps(rounded(results), indent=1, sort_keys=True, ensure_ascii=False)
-        path = self.data / f"{name}.json"
+        text = json.dumps(rounded(results, 6), indent=1, sort_keys=True, ensure_ascii=False)
+        path = self.file_of(name)
         # In one step: a run that is stopped must leave what it had.
         part = path.with_suffix(".part")
         part.write_text(text + "\n", encoding="utf-8")
         part.replace(path)
-
-
-def rounded(value: Any) -> Any:
-    """Keep six digits of every number."""
-    if isinstance(value, dict):
-        return {str(key): rounded(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [rounded(item) for item in value]
-    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def full(docs: Path, cache: Path) -> Settings:

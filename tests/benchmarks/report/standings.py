@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .cells import MATERIALS
 from .contenders import (
     DEFAULT,
     EEVEE,
@@ -22,9 +23,10 @@ from .contenders import (
     Contender,
     contender_of,
 )
+from .lights import RIGS
 from .matrix import wanted_cells
 from .results import Results
-from .scenes import MATERIALS, RIGS, SHAPES
+from .shapes import SHAPES
 
 Row = Mapping[str, Any]
 
@@ -32,7 +34,7 @@ MEASURED, MEASURED_SHADOWS = "CDRF measured", "CDRF measured, shadows"
 DENOISED = f"{PATHS}, denoised, 16"
 MAIN = (PAPER, "CDRF ring", DEFAULT, SHADOWS, MEASURED, MEASURED_SHADOWS, PRINCIPLED, TEXTURE,
         DENOISED)  # fmt: skip
-"""Of these each scene is told in one line, beside Lambert."""
+"""A scene is summarised in one line by these, beside Lambert."""
 SAME_AS = {SHADOWS: DEFAULT, MEASURED_SHADOWS: MEASURED, PAPER: "CDRF ring"}
 """Where nothing casts a shadow, or curvature is the same everywhere, these are one picture."""
 SHORT = {
@@ -116,8 +118,8 @@ def matrix_sentences(results: Results) -> list[str]:
     ):
         best = (contender_of(best_of(cell, measure=measure)) for cell in cells)
         wins = Counter(one.family for one in best if one)
-        told = ", ".join(f"{name} in {count}" for name, count in wins.most_common())
-        found.append(f"Of EEVEE's techniques in {len(cells)} scenes, {words}: {told}.")
+        phrases = ", ".join(f"{name} in {count}" for name, count in wins.most_common())
+        found.append(f"Of EEVEE's techniques in {len(cells)} scenes, {words}: {phrases}.")
     found[-2] += (
         f" In {sum(_close_call(cell) for cell in cells)} of them the next technique is behind by "
         "less than the reference's noise."
@@ -129,18 +131,18 @@ def _pairs(cells: Sequence[Row]) -> list[str]:
     """How often a setting, chosen beforehand, is closer than Lambert and than EEVEE's own."""
     found = []
     for name in (DEFAULT, SHADOWS, PAPER, TEXTURE):
-        told = []
+        phrases = []
         for other, words in ((LAMBERT, "Lambert"), (PRINCIPLED, "EEVEE's own scattering")):
             closer, alike, both = against(cells, name, other)
             if both:
-                told.append(f"{words} in {closer} of {both} scenes (higher SSIM in {alike})")
-        if told:
-            found.append(f"{name} is closer than {' and than '.join(told)}.")
+                phrases.append(f"{words} in {closer} of {both} scenes (higher SSIM in {alike})")
+        if phrases:
+            found.append(f"{name} is closer than {' and than '.join(phrases)}.")
     return found
 
 
 def _close_call(cell: Row) -> bool:
-    """Whether EEVEE's second-best technique is as good as the best, for all the reference tells."""
+    """Whether EEVEE's second-best technique equals the best within the reference's noise."""
     least: dict[str, float] = {}
     for name, one in _eevee_rows(cell):
         error = cell["contenders"][name]["rmse"]["all"]
@@ -166,18 +168,18 @@ def _group_sentences(results: Results) -> list[str]:
     """Which of EEVEE's contenders is closest on average under each kind of light, and so on."""
     found = []
     for part, by_name in groups(results).items():
-        told = []
+        phrases = []
         for name, cells in by_name.items():
             # On equal terms the plainer one is named: Lambert first, raw curvature last.
             names = (LAMBERT, *(one for one in MAIN if of_eevee(one) and one != PAPER), PAPER)
             means = {one: share(cells, one, "all")[0] for one in names}
             best = min(means, key=lambda one: means[one])
             if math.isfinite(means[best]):
-                told.append(f"{name}: {best}, {means[best]:.2f}")
-        if told:
+                phrases.append(f"{name}: {best}, {means[best]:.2f}")
+        if phrases:
             found.append(
                 f"By {part}, EEVEE's contender with the least mean error, and that error as a part "
-                "of Lambert's: " + "; ".join(told) + "."
+                "of Lambert's: " + "; ".join(phrases) + "."
             )
     return found
 

@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from cdrf_addon.core.reflectance.profile import Profile
 from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
 from cdrf_addon.core.scattering.presets import PRESETS, Colour, Preset
 
-Array = NDArray[np.float64]
+from ..common.arrays import Array
 
 PRESET_OF = {"skin": "SKIN2", "marble": "MARBLE", "milk": "WHOLE_MILK"}
 GAUSSIANS = 6

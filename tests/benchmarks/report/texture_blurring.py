@@ -20,10 +20,8 @@ from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from cdrf_addon.core.reflectance.profile import Profile
 
-from .scenes import Geometry
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from ..common.arrays import Array, Mask
+from .geometry import Geometry
 
 TAPS = np.arange(-3, 4)
 """In standard deviations, as in the chapter's convolution shader."""
@@ -216,7 +214,7 @@ def shade(geometry: Geometry, lighting: Lighting, albedo: Array, profile: Profil
 
     Args:
         geometry: With UVs.
-        lighting: What arrives at the surface; its time is told apart, as a renderer has it anyway.
+        lighting: What arrives at the surface; timed apart, as a renderer has it anyway.
         albedo: (3,).
         profile: Widths in mm.
         millimetres: In a world unit.

@@ -2,15 +2,14 @@
 """What a frame costs. Run it when the machine is quiet: `--timing`.
 
 Everything is interleaved: in each round every contender has its turn, so that a drift of the
-machine meets all alike, and what is told is the ratio within a round. Each measurement is kept as
-it is done; a run that was broken off goes on where it stopped.
+machine meets all alike, and reported is the ratio within a round. Each measurement is kept as it is
+done; an interrupted run goes on where it stopped.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
@@ -20,14 +19,16 @@ from typing import Any
 
 import bpy
 import numpy as np
-from machine import machine
-from run import mesh_of, peak_megabytes, reset_peak
 from surfaces import ALL_SURFACES
 
 from cdrf_addon.measuring.process import measure as measure_spheres
 from cdrf_addon.measuring.request import Request
-from node_groups import drawer
 
+from ..common.draws import drawer
+from ..common.machine import machine
+from ..common.shapes import mesh_of
+from ..common.timing import Spent, spread, timed
+from .cells import Cell
 from .contenders import (
     CONTENDERS,
     CYCLES,
@@ -42,8 +43,8 @@ from .contenders import (
     TEXTURE,
     Contender,
 )
-from .scenes import Cell, Stage
 from .settings import SEED, Settings
+from .stage import Stage
 
 CELL = Cell("head", "skin", "sun")
 UNSHADOWED = "Lambert, no shadows"
@@ -61,23 +62,10 @@ QUICK_SIZES = {"pixels": (64, 128), "lights": (1,), "vertices": (2_000,)}
 SIZES = {"pixels": PIXELS, "lights": LIGHTS, "vertices": VERTICES}
 DRAWN = 512
 
-Spent = dict[str, float]
-
 
 def base_of(name: str) -> str:
     """What a contender's time is compared with."""
     return LAMBERT if name in WITH_SHADOWS else UNSHADOWED
-
-
-def timed(call: Callable[[], Any]) -> Spent:
-    """Seconds on the clock, seconds of all cores, and megabytes more at the peak."""
-    before, start = os.times(), time.perf_counter()
-    memory = reset_peak()
-    call()
-    after = os.times()
-    cpu = after.user + after.system - before.user - before.system
-    return {"wall": time.perf_counter() - start, "cpu": cpu,
-            "megabytes": peak_megabytes() - memory}  # fmt: skip
 
 
 def by_name(names: Iterable[str]) -> list[Contender]:
@@ -107,7 +95,7 @@ def run(settings: Settings, rounds: int, parts: Sequence[str], deadline: float) 
             settings.write("timing", results)
 
 
-def forget(settings: Settings, parts: Sequence[str]) -> None:
+def discard(settings: Settings, parts: Sequence[str]) -> None:
     """Throw away the rounds of earlier runs."""
     results = settings.read("timing")
     settings.write("timing", {name: part for name, part in results.items() if name not in parts})
@@ -120,7 +108,7 @@ def _keep(known: dict[str, Any], name: str, spent: dict[str, Spent]) -> None:
 
 
 def _due(known: dict[str, Any], name: str, point: object) -> bool:
-    """Tell whether a measurement of this round is still to be done."""
+    """Return whether a measurement of this round is still to be done."""
     return len(known["rows"].get(name, {}).get(str(point), [])) <= known["rounds"]
 
 
@@ -201,9 +189,10 @@ def vertices(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
     for size in _sizes(settings, "vertices"):
         stage = Stage(Cell("torus", "skin", "sun"), settings)
         draw = drawer(stage.rig, DRAWN)
-        stage.item.data = mesh_of(ALL_SURFACES["jittered torus"](size))
-        stage.item.data.shade_smooth()
-        stage.wear(stage.wax)
+        surface = ALL_SURFACES["jittered torus"](size)
+        stage.obj.data = mesh_of(surface.vertices, surface.triangles)
+        stage.obj.data.shade_smooth()
+        stage.assign(stage.scattering)
         spent = timed(bpy.ops.cdrf.setup)
         if _due(known, "Make Translucent", size):
             _keep(known, "Make Translucent", {str(size): spent})
@@ -217,7 +206,7 @@ def vertices(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
 def preparation(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
     """What comes before the first frame of an untouched object."""
     stage = Stage(Cell("sphere", "skin", "sun") if settings.sample else CELL, settings)
-    known["cell"], known["vertices"] = stage.cell.name, len(stage.item.data.vertices)
+    known["cell"], known["vertices"] = stage.cell.name, len(stage.obj.data.vertices)
     setup = timed(bpy.ops.cdrf.setup)
     if _due(known, DEFAULT, "setup"):
         _keep(known, DEFAULT, {"setup": setup})
@@ -243,12 +232,6 @@ PARTS: dict[str, Callable[[Settings, dict[str, Any]], Iterator[None]]] = {
 
 
 # --- what is made of it --------------------------------------------------------------------------
-
-
-def spread(values: Iterable[float]) -> tuple[float, float, float]:
-    """Median, 10 % and 90 %."""
-    low, middle, high = np.percentile(list(values), (10, 50, 90))
-    return float(middle), float(low), float(high)
 
 
 def split(rows: dict[str, list[Spent]], clock: str = "wall") -> list[tuple[float, float]]:
