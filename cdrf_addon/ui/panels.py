@@ -133,7 +133,7 @@ def draw_display(
     shown = shows_curvature(material)
     button = row.operator(
         "cdrf.show_curvature",
-        text="Show Skin" if shown else "Show Curvature",
+        text="Show Material" if shown else "Show Curvature",
         icon="HIDE_OFF",
         depress=shown,
     )
