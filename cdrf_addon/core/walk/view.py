@@ -79,11 +79,14 @@ class WalkModel:
     def flat_part(
         self, colour: ArrayLike, mu: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return A G of walks without an end, and what the end takes away."""
+        """Return A G of walks without an end, and what the end takes away.
+
+        Of the older methods only the difference of the two is meant (core/walk/flat.py).
+        """
         a, view = _colour(colour), _view(mu)
         inner = _polynomial(self.flat.base, view) + a * _polynomial(self.flat.slope, view)
         tail = sum(t * a**n for t, n in zip(self.flat.tail, TAIL_POWERS, strict=True))
-        lost = np.maximum(_polynomial(self.flat.lost, view) * tail, 0.0)
+        lost = np.asarray(_polynomial(self.flat.lost, view) * tail)
         return np.clip(a * (1.0 + (1.0 - a) * inner), 0.0, 1.0), lost
 
     def reflected(
