@@ -46,6 +46,10 @@ HAZE_RATIO = 1.25
 # No plane gives all back: keeps 0 / 0 away at A = 1 and l H = 0.
 LEAST_LOST = 1e-4
 
+# Shallowest mean entry the fit of `GAIN` has seen; what is below it (rough, index near 1, seen from
+# the side) takes this one's, where the polynomial is sure to be positive.
+LEAST_DEPTH = 0.18
+
 # width: s y / sqrt(1 + (s y / m)^2), y = l kappa
 #   s = (0 + 1 A + 2 A^2 + 3 A^3) (1 + 4 depth), m = 5 + 6 A + 7 depth
 WIDTH = (0.4203, 1.9395, -4.4425, 4.5363, 0.7467, 1.0142, -0.8719, 0.1057)
@@ -54,9 +58,9 @@ TILT = (1.2245, -0.2342, -0.9843, 0.8979, -1.1682, 3.5273)
 # haze: A^2 (0 + 1 A^2) (1 + 2 depth) y^2 / (y + 3)
 HAZE = (0.1426, 0.0159, 3.6315, 0.0398)
 # z = y (0 + (1 + 2 A + 3 A^2 + depth (4 + 5 A + 6 A^2)) y / (y + 7 + 8 (1 - A) depth)), y = l H
-GAIN = (1.0924, 41.3696, -122.7899, 91.6057, -40.2018, 138.8376, -89.9993, 0.1672, 3.1938)
+GAIN = (1.1047, 100.0546, -296.318, 210.8184, -94.8402, 334.8726, -183.3339, 0.9669, 9.5458)
 # From l H = 1 / ENDED on no walk is ended early.
-ENDED = 2.7633
+ENDED = 4.2457
 # h = 0 + 1 A + depth (2 + 3 A) + 4 y / (1 + y), y = -l H
 HOLLOW = (1.273, -0.254, -0.534, 1.254, 0.488)
 
@@ -117,7 +121,7 @@ class WalkModel:
     def _odds(
         self, a: NDArray[np.float64], mu: ArrayLike, y: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        depth = self.depth(mu)
+        depth = np.maximum(self.depth(mu), LEAST_DEPTH)
         top = (
             (GAIN[1] + depth * GAIN[4])
             + (GAIN[2] + depth * GAIN[5]) * a
