@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the coefficients of core/walk/view.py from walks of balls and hollows, and judges them.
 
-    ./dev python tests/benchmarks/walk_tables.py             walks, fits, prints; ten minutes
+    ./dev python tests/benchmarks/walk_tables.py             walks, fits, prints; ninety seconds with --walks 2000
     ./dev python tests/benchmarks/walk_tables.py --judge     judges what view.py has now
 
 Nothing is tabulated in the end: 33 numbers hold what tables of albedo, curvature and view would.
 What view.py ships was fitted by the same formulas and weights to 100,000 to 200,000 walks a view of
-a compiled copy of the walk (numba), which NumPy takes hours for; this command comes to the same
+a compiled copy of the walk (numba), which takes NumPy an hour; this command comes to the same
 errors, not to the same digits: the nine numbers of GAIN trade against each other.
 Each half of the walks has its own seed; the difference of the two is the Monte-Carlo error, and its
 square is taken off the squared error of the model.
