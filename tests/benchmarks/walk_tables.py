@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the coefficients of core/walk/view.py from walks of balls and hollows, and judges them.
 
-    ./dev python tests/benchmarks/walk_tables.py             walks, fits, prints; ninety seconds with --walks 2000
+    ./dev python tests/benchmarks/walk_tables.py             fits; 90 s with --walks 2000
     ./dev python tests/benchmarks/walk_tables.py --judge     judges what view.py has now
 
 Nothing is tabulated in the end: 33 numbers hold what tables of albedo, curvature and view would.
