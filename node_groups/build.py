@@ -31,8 +31,10 @@ from cdrf_addon.blender.nodes.reflectance import (  # noqa: E402
     reflectance_group,
 )
 from cdrf_addon.blender.nodes.tables import ensure_table  # noqa: E402
+from cdrf_addon.blender.nodes.walk import haze_group, walk_group  # noqa: E402
 from cdrf_addon.core.reflectance.model import name_of, ring, sphere  # noqa: E402
 from cdrf_addon.core.reflectance.profile import profile  # noqa: E402
+from cdrf_addon.core.walk.material import DEFAULT_WALK, model_of_key  # noqa: E402
 
 ASSET_FILE = HERE / "cdrf.blend"
 TOPOLOGY_FILE = HERE / "topology.txt"
@@ -83,6 +85,9 @@ def build_all() -> list[bpy.types.ShaderNodeTree]:
     ]
     built += [harmonics_group(), detail_group(), under_specular_group()]
     built.append(diffused_group())
+    walk = DEFAULT_WALK.key
+    built += [walk_group(walk, model_of_key(walk), curved=curved) for curved in (False, True)]
+    built.append(haze_group())
     built += [lit_group(translucent=translucent) for translucent in (False, True)]
     built += [display_group(signed=signed) for signed in (False, True)]
     return built

@@ -32,8 +32,10 @@ from .material.translucent import materials_on
 from .mesh.attributes import (
     VertexCurvature,
     has_curvature,
+    has_walk_curvature,
     mark_filled,
     remove_curvature,
+    round_shape,
     write_curvature,
 )
 from .mesh.surface import (
@@ -175,7 +177,7 @@ def measure_steps(
     work.metric = shape.metric
     work.evaluated_vertices = len(shape.mesh.vertices)
     known = work.mesh.cdrf
-    is_stored = known.kind in {FLAT, CONSTANT} or has_curvature(work.mesh)
+    is_stored = known.kind in {FLAT, CONSTANT} or has_walk_curvature(work.mesh)
     if known.fingerprint == shape.fingerprint and is_stored and not recompute:
         yield 1.0
         return
@@ -235,12 +237,21 @@ def _shape_steps(work: MeshWork, shape: Shape) -> Generator[float, None, VertexC
     work.warnings = found.sentences()
     principal = np.stack((found.kappa, found.k1, found.k2, found.mean), axis=1)
     levels = np.repeat(found.kappa[:, None], LEVELS, axis=1)
+    means = np.repeat(found.mean[:, None], LEVELS, axis=1)
+    shape_operator = round_shape(_as_stored(found.mean))
     shortest = np.ones_like(found.kappa)
     if cleaned is not None and work.summary.kind == VARYING:
         diffused = yield from portion(level_steps(cleaned), 0.75, 1.0)
-        levels, shortest = diffused.values, diffused.shortest
+        levels, shortest = diffused.kappa.values, diffused.kappa.shortest
+        means = diffused.mean
+        shape_operator = _as_stored(diffused.shape)
     return VertexCurvature(
-        *(_as_stored(values) for values in (principal, levels, shortest, found.filled))
+        _as_stored(principal),
+        _as_stored(levels),
+        _as_stored(means),
+        shape_operator,
+        _as_stored(shortest),
+        _as_stored(found.filled),
     )
 
 

@@ -28,6 +28,7 @@ from .material.shader_group import remove_unused
 from .material.shadow_choice import choose_shadows
 from .material.specular import add_specular
 from .material.translucent import materials_on, translucent_materials_of
+from .material.walk import walk_for
 from .mesh_work import (
     MeshWork,
     group_by_mesh,
@@ -241,6 +242,9 @@ class Setup:
         if source == CONSTANT:
             kappas = [each.mean_values[0] for each in work]
             node.inputs[ids.CURVATURE].default_value = float(np.mean(kappas))
+            if ids.MEAN in node.inputs:
+                means = [each.mean_values[3] for each in work]
+                node.inputs[ids.MEAN].default_value = float(np.mean(means))
 
     def _variant(
         self, material: bpy.types.Material, source: str, lights: list[SceneLight]
@@ -257,6 +261,7 @@ class Setup:
             occluded=settings.is_occluded(material),
             shadows=choose_shadows(material, self.view_layer),
             links=linking.links_of(lights),
+            walk=walk_for(material, model),
         )
 
     def _shader_group(self, variant: Variant, lights: list[SceneLight]) -> bpy.types.ShaderNodeTree:

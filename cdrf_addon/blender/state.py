@@ -18,7 +18,7 @@ from .material import linking, specular
 from .material.install import cdrf_node, cdrf_output
 from .material.lighting import lights_of_translucent, lit_elsewhere
 from .material.shadow_choice import choose_shadows
-from .mesh.attributes import has_curvature, is_measured
+from .mesh.attributes import has_curvature, has_walk_curvature, is_measured
 from .mesh.surface import base_fingerprint, metric_of
 from .nodes.tables import Table, find_table
 from .shader.bits import bits_due
@@ -226,6 +226,7 @@ def _variant_reasons(
         occluded=variant.occluded,
         shadows=variant.shadows,
         links=variant.links,
+        walk=variant.walk,
     )
     if wanted != variant:
         reasons.append("The colour ratio was changed in the node.")
@@ -233,8 +234,9 @@ def _variant_reasons(
 
 
 def _attribute_reasons(obj: bpy.types.Object, node: bpy.types.ShaderNode) -> list[str]:
-    source = stamped_variant(node.node_tree).source
-    if source in {ATTRIBUTE, SCALED} and not has_curvature(obj.data):
+    variant = stamped_variant(node.node_tree)
+    has_all = has_walk_curvature if variant.walk else has_curvature
+    if variant.source in {ATTRIBUTE, SCALED} and not has_all(obj.data):
         return [f"'{obj.name}' has no curvature yet."]
     return []
 

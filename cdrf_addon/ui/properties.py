@@ -64,6 +64,15 @@ def _profile_changed(self: CdrfMaterial, _context: bpy.types.Context) -> None:
             set_kind(self.id_data, PROFILE)
 
 
+def _get_view(self: CdrfMaterial) -> bool:
+    return settings.is_view_dependent(self.id_data)
+
+
+def _set_view(self: CdrfMaterial, value: bool) -> None:
+    with contextlib.suppress(CdrfError):
+        settings.set_view_dependent(self.id_data, value)
+
+
 def _get_occlusion(self: CdrfMaterial) -> bool:
     return settings.is_occluded(self.id_data)
 
@@ -160,6 +169,16 @@ class CdrfMaterial(bpy.types.PropertyGroup):
         set=_set_specular,
         options=set(),
     )
+    view_dependence: BoolProperty(
+        name="View Dependence",
+        description=(
+            "Bring light out of the surface as the path tracer's random walk does: more at the rim "
+            "and where the surface bulges, less in hollows. For Path-Traced Look only"
+        ),
+        get=_get_view,
+        set=_set_view,
+        options=set(),
+    )
     ambient_occlusion: BoolProperty(
         name="Ambient Occlusion",
         description=(
@@ -196,6 +215,9 @@ class CdrfMaterial(bpy.types.PropertyGroup):
     chosen_sigma0: FloatProperty(default=settings.UNSET, options={"HIDDEN"})
     chosen_ratio: FloatVectorProperty(size=3, default=(1.0, 1.0, 1.0), options={"HIDDEN"})
     chosen_gloss: IntProperty(default=-1, options={"HIDDEN"})
+    chosen_view: IntProperty(default=-1, options={"HIDDEN"})
+    chosen_walk: StringProperty(options={"HIDDEN"})
+    chosen_free_path: FloatVectorProperty(size=3, default=(0.0, 0.0, 0.0), options={"HIDDEN"})
     chosen_occlusion: BoolProperty(default=False, options={"HIDDEN"})
     measured: StringProperty(options={"HIDDEN"})
     # Blender deletes pictures that nobody uses; this one is needed again.

@@ -100,7 +100,7 @@ class Pixels:
 def levels_of(shape: Shape) -> KappaLevels:
     """Measure curvature as Make Translucent does."""
     mesh = TriMesh.from_arrays(shape.vertices, shape.triangles)
-    return run_steps(level_steps(run_steps(curvature_steps(mesh, Options()))))
+    return run_steps(level_steps(run_steps(curvature_steps(mesh, Options())))).kappa
 
 
 def contenders(cache: Path) -> list[Contender]:

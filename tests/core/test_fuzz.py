@@ -123,7 +123,7 @@ def judge(seed: int, number: int) -> str:
     try:
         mesh = TriMesh.from_arrays(vertices, triangles)
         cleaned = run_steps(curvature_steps(mesh, options_of(number)))
-        levels = run_steps(level_steps(cleaned))
+        levels = run_steps(level_steps(cleaned)).kappa
         field = cleaned.on_source()
         summary = summarise(mesh, field)
     except CdrfError as refusal:

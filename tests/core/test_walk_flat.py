@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from cdrf_addon.core.scattering import BURLEY, LEGACY, RANDOM_WALK, SKIN
+from cdrf_addon.core.scattering.node_radius import BURLEY, LEGACY, RANDOM_WALK, SKIN
 from cdrf_addon.core.walk import entry as entries
 from cdrf_addon.core.walk.chandrasekhar import escape
 from cdrf_addon.core.walk.entry import entry

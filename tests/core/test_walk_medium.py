@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cdrf_addon.core.errors import ParameterError
-from cdrf_addon.core.scattering import BURLEY, LEGACY, RANDOM_WALK, SKIN
+from cdrf_addon.core.scattering.node_radius import BURLEY, LEGACY, RANDOM_WALK, SKIN
 from cdrf_addon.core.walk.medium import METHODS, chiang, colour_of, medium, van_de_hulst
 
 pytestmark = pytest.mark.smoke

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdrf_addon.core.heat_kernel import sphere_reflectance
-from cdrf_addon.core.scattering import BURLEY, LEGACY, RANDOM_WALK, SKIN
+from cdrf_addon.core.reflectance.sphere_model import sphere_reflectance
+from cdrf_addon.core.scattering.node_radius import BURLEY, LEGACY, RANDOM_WALK, SKIN
 from cdrf_addon.core.walk.sphere_walk import ACROSS, ALONG, HOLLOW, views, walk
 from cdrf_addon.core.walk.view import kernel, walk_model
 

@@ -27,7 +27,14 @@ def members(name: str) -> tuple[str, ...]:
 
 BASE = "{ids,compat,paths}"
 GENERAL = "core/{arguments,colour_scale,errors,progress}"
-CORE = (GENERAL, "core/curvature", "core/reflectance", "core/scattering", "core/measured")
+CORE = (
+    GENERAL,
+    "core/curvature",
+    "core/reflectance",
+    "core/scattering",
+    "core/walk",
+    "core/measured",
+)
 LEAVES = "blender/{units,pictures,instances}"
 BELOW = (BASE, *CORE, LEAVES)
 SCENE = ("blender/mesh", "blender/nodes", "blender/lights", "blender/world")
@@ -43,6 +50,10 @@ ROOMS: dict[str, Room] = {
     ),
     "core/scattering": Room(
         "from coefficients, presets or Blender's radius to σ₀", (GENERAL, "core/reflectance")
+    ),
+    "core/walk": Room(
+        "the path tracer's random walk: medium, flat limit, gain, tilt, width, own walks",
+        (GENERAL, "core/reflectance", "core/scattering"),
     ),
     "core/measured": Room(
         "path-traced spheres: file, fits, smoothing, the measured model",

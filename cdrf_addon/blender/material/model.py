@@ -20,6 +20,7 @@ from ..shader.variant import stamped_variant
 from . import settings
 from .install import cdrf_node, require_editable
 from .shader_group import change_variant, remove_unused
+from .walk import walk_for
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -97,7 +98,7 @@ def set_model(material: bpy.types.Material, key: str) -> None:
         red, green, blue = (r * math.sqrt(m) for r, m in zip(ratio, before.moments, strict=True))
         ratio = (red, green, blue)
     settings.store_sigma0_ratio(material, ratio)
-    change_variant(material, model=key)
+    change_variant(material, model=key, walk=walk_for(material, key))
     remove_unused()
 
 

@@ -15,11 +15,14 @@ from ...core.reflectance.model import DEFAULT_KIND, PROFILE, SPHERE
 from ...core.reflectance.profile import SKIN_PROFILE
 from ...core.scattering.node_radius import sigma0_per_radius
 from ...core.scattering.presets import Preset, in_units
+from ...core.walk.material import DEFAULT_WALK
 from ..nodes.tables import table_of
 from . import settings
 from .install import cdrf_node, require_editable
-from .model import ensure_chosen, has_colour, set_kind
+from .model import ensure_chosen, has_colour, model_key, set_kind
 from .scattering import Scattering
+from .shader_group import change_variant
+from .walk import store_walk, walk_for, write_free_path
 
 
 def channel_sigma0(material: bpy.types.Material) -> list[float]:
@@ -44,7 +47,15 @@ def set_scattering(material: bpy.types.Material, found: Scattering) -> None:
     """Take the scatter distances from what a Principled or Subsurface Scattering node has."""
     factors = sigma0_per_radius(found.albedo, walk_method(found.method))
     sigma0 = [radius * float(factor) for radius, factor in zip(found.radius, factors, strict=True)]
+    store_walk(material, found.walk, found.albedo)
     set_channel_sigma0(material, sigma0)
+    show_walk(material)
+
+
+def show_walk(material: bpy.types.Material) -> None:
+    """Give a translucent material the walk that was stored for it."""
+    change_variant(material, walk=walk_for(material, model_key(material)))
+    write_free_path(material)
 
 
 def apply_preset(material: bpy.types.Material, preset: Preset, metres: float, size: float) -> None:
@@ -69,7 +80,10 @@ def apply_preset(material: bpy.types.Material, preset: Preset, metres: float, si
     elif has_colour(material):
         set_kind(material, DEFAULT_KIND)
     settings.set_sigma0(material, sigma0)
+    if preset.model != PROFILE:
+        store_walk(material, DEFAULT_WALK, preset.albedo)
     settings.set_sigma0_ratio(material, ratio)
+    show_walk(material)
     choose_detail(material)
 
 

@@ -14,7 +14,9 @@ import bpy
 import numpy as np
 
 from ... import ids
-from ...compat import uses_nodes
+from ...compat import uses_nodes, walk_method
+from ...core.scattering.node_radius import SKIN
+from ...core.walk.material import DEFAULT_WALK, MaterialWalk
 from ..pictures import linear_from_srgb, pixels_of
 
 Colour = tuple[float, float, float]
@@ -35,6 +37,8 @@ class Scattering:
     """Blender's name: RANDOM_WALK, RANDOM_WALK_SKIN or BURLEY."""
     weight: float
     """Part of the surface that scatters; 1 for a Subsurface Scattering node."""
+    walk: MaterialWalk = DEFAULT_WALK
+    """How light walks under the surface."""
     notes: tuple[str, ...] = ()
     """What could not be read as it is; a sentence each, for the artist."""
 
@@ -110,14 +114,28 @@ def _of_node(node: bpy.types.ShaderNode) -> Scattering | None:
     lengths = [max(part * scale, 0.0) for part in _vector(node, names[2], notes)]
     if not (max(lengths) > 0.0 and np.isfinite(lengths).all()):
         return None
-    if method != "BURLEY" and _number(node, names[3], []) != 0.0:
-        notes.append(f"The anisotropy of '{node.name}' is left out.")
     if weight < 1.0:
         notes.append(
             f"Only {weight:.0%} of '{node.name}' scatters; CDRF takes the whole surface as if it "
             "did, so lower the scatter distance if that is too much."
         )
-    return Scattering(albedo, (lengths[0], lengths[1], lengths[2]), method, weight, tuple(notes))
+    radius = (lengths[0], lengths[1], lengths[2])
+    walk = _walk(node, walk_method(method), names[3], notes)
+    return Scattering(albedo, radius, method, weight, walk, tuple(notes))
+
+
+def _walk(
+    node: bpy.types.ShaderNode, method: str, anisotropy: str, notes: list[str]
+) -> MaterialWalk:
+    """Read roughness, index and anisotropy; a node without an input has Blender's default."""
+
+    def number(name: str, usual: float) -> float:
+        known = name in node.inputs and node.inputs[name].enabled
+        return _number(node, name, notes) if known else usual
+
+    roughness = number("Roughness", 1.0)
+    index = "Subsurface IOR" if method == SKIN else "IOR"
+    return MaterialWalk(method, roughness**2, number(index, 1.4), number(anisotropy, 0.0))
 
 
 def _number(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> float:

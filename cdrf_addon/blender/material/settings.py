@@ -19,6 +19,7 @@ from ..shader.variant import stamped_variant
 from . import specular
 from .install import cdrf_node
 from .shader_group import change_variant
+from .walk import OFF, ON, walk_for
 
 SIGMA0_MAX = 1e6
 RATIO_MAX = 1e3
@@ -100,6 +101,27 @@ def set_occluded(material: bpy.types.Material, value: bool) -> None:
     """
     material.cdrf.chosen_occlusion = value
     change_variant(material, occluded=value)
+
+
+def is_view_dependent(material: bpy.types.Material) -> bool:
+    """Return whether the surface depends on the view as path-traced scattering does."""
+    node = cdrf_node(material)
+    if node is not None:
+        return bool(stamped_variant(node.node_tree).walk)
+    return bool(material.cdrf.chosen_view == ON)
+
+
+def set_view_dependent(material: bpy.types.Material, value: bool) -> None:
+    """Switch the dependence on the view.
+
+    Raises:
+        SceneError: The material's table was deleted.
+    """
+    material.cdrf.chosen_view = ON if value else OFF
+    node = cdrf_node(material)
+    if node is not None:
+        model = stamped_variant(node.node_tree).model
+        change_variant(material, walk=walk_for(material, model))
 
 
 def is_specular(material: bpy.types.Material) -> bool:

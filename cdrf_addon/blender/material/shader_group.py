@@ -14,6 +14,7 @@ from ..world.stamps import stamped_world
 from . import linking
 from .install import cdrf_node, install
 from .shadow_choice import choose_shadows
+from .walk import write_free_path
 
 
 def change_variant(
@@ -22,6 +23,7 @@ def change_variant(
     model: str | None = None,
     occluded: bool | None = None,
     shadows: ShadowChoice | None = None,
+    walk: str | None = None,
 ) -> None:
     """Swap a translucent material's shader group where its node or what is given asks for another.
 
@@ -30,6 +32,7 @@ def change_variant(
         model: Key of another model; None for the present one.
         occluded: Whether it has Ambient Occlusion; None as now.
         shadows: What shadows its lights get; None as now.
+        walk: Key of the walk that it shows; None as now.
 
     Raises:
         SceneError: The material's table was deleted.
@@ -46,6 +49,7 @@ def change_variant(
         occluded=now.occluded if occluded is None else occluded,
         shadows=now.shadows if shadows is None else shadows,
         links=now.links,
+        walk=now.walk if walk is None else walk,
     )
     if wanted != now:
         _install(material, node.node_tree, wanted)
@@ -80,6 +84,7 @@ def _install(
     # The world's light as it was at the last Update: a slider must not render anything.
     light = stamped_world(group)
     install(material, ensure_shader_group(wanted, scene, lights, light))
+    write_free_path(material)
     linking.write_unlit()
 
 

@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from ... import ids
+from ...core.curvature.estimators.tensor import PARTS
 from ...core.curvature.scale_space import LEVELS
 from ...core.curvature.summary import VARYING
 from .surface import positions
@@ -20,6 +21,21 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 ORIGIN_ATTRIBUTE = ".cdrf_origin"
+# Columns of principal curvatures, levels, means and shape operator; two more follow.
+_WIDTHS = (4, LEVELS, LEVELS, PARTS)
+_COLUMNS = sum(_WIDTHS) + 2
+# Of the shape operator's entries: those that one vector holds, and those of the other.
+_DIAGONAL, _MIXED = (0, 3, 5), (4, 2, 1)
+
+
+def round_shape(mean: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the shape operator of a surface that bends alike in all directions, (n, PARTS).
+
+    It has a part along the normal too, which nothing reads.
+    """
+    shape = np.zeros((len(mean), PARTS), dtype=np.float32)
+    shape[:, _DIAGONAL] = mean[:, None]
+    return shape
 
 
 @dataclass(frozen=True)
@@ -30,6 +46,10 @@ class VertexCurvature:
     """(n, 4) kappa, k1, k2 and signed mean curvature, 1/unit."""
     levels: NDArray[np.float32]
     """(n, LEVELS) kappa at the diffusion lengths, 1/unit."""
+    means: NDArray[np.float32]
+    """(n, LEVELS) signed mean curvature at the same lengths, 1/unit."""
+    shape: NDArray[np.float32]
+    """(n, PARTS) the shape operator in the object's axes: xx, xy, xz, yy, yz, zz, 1/unit."""
     shortest: NDArray[np.float32]
     """(n,) the shortest of these lengths, in world units."""
     filled: NDArray[np.float32]
@@ -38,26 +58,30 @@ class VertexCurvature:
     @classmethod
     def flat(cls, count: int) -> VertexCurvature:
         """Return no curvature at that many vertices."""
-        return cls._of_columns(np.zeros((count, 4 + LEVELS + 2), dtype=np.float32))
+        return cls._of_columns(np.zeros((count, _COLUMNS), dtype=np.float32))
 
     @classmethod
     def constant(cls, count: int, values: tuple[float, ...]) -> VertexCurvature:
         """Return one curvature at that many vertices: kappa, k1, k2 and signed mean."""
         principal = np.tile(np.array(values, dtype=np.float32), (count, 1))
         levels = np.repeat(principal[:, :1], LEVELS, axis=1)
+        means = np.repeat(principal[:, 3:], LEVELS, axis=1)
         ones = np.ones(count, dtype=np.float32)
-        return cls(principal, levels, ones, np.zeros_like(ones))
+        shape = round_shape(principal[:, 3])
+        return cls(principal, levels, means, shape, ones, np.zeros_like(ones))
 
     @classmethod
     def _of_columns(cls, columns: NDArray[np.float32]) -> VertexCurvature:
-        principal, levels, rest = np.split(columns, (4, 4 + LEVELS), axis=1)
-        return cls(principal, levels, rest[:, 0], rest[:, 1])
+        principal, levels, means, shape, rest = np.split(columns, np.cumsum(_WIDTHS), axis=1)
+        return cls(principal, levels, means, shape, rest[:, 0], rest[:, 1])
 
     def on_original_vertices(
         self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
     ) -> tuple[VertexCurvature, int]:
         """Carry it from an object's evaluated vertices to its own; see `to_original_vertices`."""
-        columns = np.column_stack((self.principal, self.levels, self.shortest, self.filled))
+        columns = np.column_stack(
+            (self.principal, self.levels, self.means, self.shape, self.shortest, self.filled)
+        )
         carried, lost = to_original_vertices(obj, depsgraph, columns)
         return self._of_columns(carried), lost
 
@@ -161,14 +185,26 @@ def _only_deforms(obj: bpy.types.Object, evaluated_count: int) -> bool:
     )
 
 
-_COLOURS = (ids.CURVATURE_ATTRIBUTE, ids.DIFFUSED_ATTRIBUTE)
+_KINDS = {
+    ids.CURVATURE_ATTRIBUTE: "FLOAT_COLOR",
+    ids.DIFFUSED_ATTRIBUTE: "FLOAT_COLOR",
+    ids.MEAN_ATTRIBUTE: "FLOAT_COLOR",
+    ids.SHAPE_ATTRIBUTE: "FLOAT_VECTOR",
+    ids.SHAPE_MIXED_ATTRIBUTE: "FLOAT_VECTOR",
+    ids.LENGTH_ATTRIBUTE: "FLOAT",
+}
+"""Attributes that a mesh has together, with their types."""
+_WALK = (ids.MEAN_ATTRIBUTE, ids.SHAPE_ATTRIBUTE, ids.SHAPE_MIXED_ATTRIBUTE)
 
 
 def write_curvature(mesh: bpy.types.Mesh, curvature: VertexCurvature) -> None:
     """Store a mesh's curvature, without the marks of `mark_filled`."""
     _write_colours(mesh, ids.CURVATURE_ATTRIBUTE, curvature.principal)
     _write_colours(mesh, ids.DIFFUSED_ATTRIBUTE, curvature.levels)
-    _write_floats(mesh, ids.LENGTH_ATTRIBUTE, curvature.shortest)
+    _write_colours(mesh, ids.MEAN_ATTRIBUTE, curvature.means)
+    _write(mesh, ids.SHAPE_ATTRIBUTE, "FLOAT_VECTOR", "vector", curvature.shape[:, _DIAGONAL])
+    _write(mesh, ids.SHAPE_MIXED_ATTRIBUTE, "FLOAT_VECTOR", "vector", curvature.shape[:, _MIXED])
+    _write(mesh, ids.LENGTH_ATTRIBUTE, "FLOAT", "value", curvature.shortest)
     mesh.update_tag()
 
 
@@ -176,23 +212,35 @@ def mark_filled(mesh: bpy.types.Mesh, curvature: VertexCurvature) -> None:
     """Mark the vertices whose curvature comes from their neighbours; no mark, no attribute."""
     filled = curvature.filled > 0.5
     if filled.any():
-        _write_floats(mesh, ids.FILLED_ATTRIBUTE, filled.astype(np.float32))
+        _write(mesh, ids.FILLED_ATTRIBUTE, "FLOAT", "value", filled.astype(np.float32))
     elif ids.FILLED_ATTRIBUTE in mesh.attributes:
         mesh.attributes.remove(mesh.attributes[ids.FILLED_ATTRIBUTE])
 
 
-def _write_floats(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32]) -> None:
-    if name in mesh.attributes and not _holds(mesh, name, "FLOAT"):
+def _write(
+    mesh: bpy.types.Mesh, name: str, kind: str, entry: str, values: NDArray[np.float32]
+) -> None:
+    """Store values at the points of a mesh.
+
+    Args:
+        mesh: Any local mesh.
+        name: Of the attribute; one of another type gives way.
+        kind: Type of the attribute.
+        entry: Blender's name of the value in an element of that type.
+        values: One row for each vertex.
+    """
+    if name in mesh.attributes and not _holds(mesh, name, kind):
         mesh.attributes.remove(mesh.attributes[name])
     if name not in mesh.attributes:
-        mesh.attributes.new(name, "FLOAT", "POINT")
-    mesh.attributes[name].data.foreach_set("value", np.ascontiguousarray(values))
+        mesh.attributes.new(name, kind, "POINT")
+    numbers = np.ascontiguousarray(values, dtype=np.float32).ravel()
+    mesh.attributes[name].data.foreach_set(entry, numbers)
 
 
 def _write_colours(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32]) -> None:
-    if name in mesh.attributes and not _holds(mesh, name, "FLOAT_COLOR"):
-        mesh.attributes.remove(mesh.attributes[name])
-    if name not in mesh.attributes:
+    if not _holds(mesh, name, "FLOAT_COLOR"):
+        if name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
         # The first colour attribute of a mesh becomes the one to paint on: leave that as it was.
         active = mesh.color_attributes.active_color_name
         render = mesh.color_attributes.render_color_index
@@ -200,13 +248,12 @@ def _write_colours(mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32])
         if active and render >= 0:
             mesh.color_attributes.active_color_name = active
             mesh.color_attributes.render_color_index = render
-    colours = np.ascontiguousarray(values, dtype=np.float32).ravel()
-    mesh.attributes[name].data.foreach_set("color", colours)
+    _write(mesh, name, "FLOAT_COLOR", "color", values)
 
 
 def remove_curvature(mesh: bpy.types.Mesh) -> None:
     """Remove the attributes from a mesh that does not need them."""
-    for name in (*_COLOURS, ids.LENGTH_ATTRIBUTE, ids.FILLED_ATTRIBUTE):
+    for name in (*_KINDS, ids.FILLED_ATTRIBUTE):
         attribute = mesh.attributes.get(name)
         if attribute is not None:
             mesh.attributes.remove(attribute)
@@ -215,9 +262,12 @@ def remove_curvature(mesh: bpy.types.Mesh) -> None:
 
 def has_curvature(mesh: bpy.types.Mesh) -> bool:
     """Return whether a mesh carries the attributes in the form the shader reads."""
-    return _holds(mesh, ids.LENGTH_ATTRIBUTE, "FLOAT") and all(
-        _holds(mesh, name, "FLOAT_COLOR") for name in _COLOURS
-    )
+    return all(_holds(mesh, name, kind) for name, kind in _KINDS.items() if name not in _WALK)
+
+
+def has_walk_curvature(mesh: bpy.types.Mesh) -> bool:
+    """Return whether a mesh carries what view dependence reads too; older files do not."""
+    return has_curvature(mesh) and all(_holds(mesh, name, _KINDS[name]) for name in _WALK)
 
 
 def is_measured(mesh: bpy.types.Mesh) -> bool:

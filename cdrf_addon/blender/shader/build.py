@@ -23,14 +23,15 @@ from ..lights.scene_lights import SceneLight
 from ..nodes.tables import Table
 from ..nodes.tree import Operand, Sockets, TreeBuilder, declare
 from ..world.light import WorldLight
-from .curvature import surface_variance
+from .curvature import surface_sigma
 from .lights import add_lights, add_visibilities, sum_lights
-from .surface import Normals, Surface, surface_normals
-from .variant import CONSTANT, Variant
+from .surface import Normals, Surface, shading_normal, surface_normals
+from .variant import CONSTANT, FLAT, Variant
 from .visibility import thickness
+from .walk import Walk, add_walk
 from .world import add_world, filters_world
 
-VERSION = 11
+VERSION = 12
 """Raise it with every change of the wiring: Update rebuilds the groups of older files."""
 
 
@@ -55,7 +56,8 @@ def build(
     given, result = b.ends()
     if world is not None and world.environment.is_black:
         world = None
-    surface = _surface(b, variant, lights, world, table, given)
+    walk = _walk(b, variant, given)
+    surface = _surface(b, variant, lights, world, table, given, walk)
     lit = add_lights(b, variant, lights, table)
     visibilities = {}
     if variant.shadows.cast and any(light.casts for light in lights):
@@ -66,7 +68,8 @@ def build(
     if world is not None:
         total = add_world(b, variant, surface, world, total)
     emission = b.node("ShaderNodeEmission")
-    b.feed(emission.inputs["Color"], b.vector("MULTIPLY", total, given[ids.BASE_COLOR]))
+    colour = given[ids.BASE_COLOR] if walk is None else walk.reflected
+    b.feed(emission.inputs["Color"], b.vector("MULTIPLY", total, colour))
     b.feed(emission.inputs["Strength"], given[ids.STRENGTH])
     b.feed(result[ids.SHADER], emission.outputs["Emission"])
 
@@ -78,15 +81,32 @@ def _surface(
     world: WorldLight | None,
     table: Table,
     given: Sockets,
+    walk: Walk | None,
 ) -> Surface:
     """Add what all lights share, as far as something depends on it."""
     normals: Normals = {}
     variance: Operand = (0.0, 0.0, 0.0)
     if lights or (world is not None and not world.environment.is_uniform):
         normals = surface_normals(b, variant, table, given)
+        if walk is not None and walk.shift is not None:
+            normals = {
+                shared: b.vector("NORMALIZE", b.vector("SUBTRACT", normal, walk.shift))
+                for shared, normal in normals.items()
+            }
     if lights or (world is not None and filters_world(variant, world, table)):
-        variance = surface_variance(b, variant, given)
+        if walk is not None:
+            return Surface(table, normals, walk.variance, walk.haze)
+        sigma = surface_sigma(b, variant, given)
+        if variant.source != FLAT:
+            variance = b.vector("MULTIPLY", sigma, sigma)
     return Surface(table, normals, variance)
+
+
+def _walk(b: TreeBuilder, variant: Variant, given: Sockets) -> Walk | None:
+    if not variant.walk:
+        return None
+    sigma = surface_sigma(b, variant, given)
+    return add_walk(b, variant, given, sigma, shading_normal(b, variant, given))
 
 
 def _declare(tree: bpy.types.ShaderNodeTree) -> None:
@@ -154,3 +174,14 @@ def _declare_extras(tree: bpy.types.ShaderNodeTree, variant: Variant) -> None:
         declare(
             tree, ids.CURVATURE, default=0.0, low=0.0, tip="Curvature of the whole mesh, 1/length"
         )
+    if variant.walk:
+        declare(
+            tree,
+            ids.FREE_PATH,
+            "Vector",
+            default=(1.0, 1.0, 1.0),
+            low=0.0,
+            tip="Mean free path of red, green and blue over their scatter distances",
+        )
+        if variant.source == CONSTANT:
+            declare(tree, ids.MEAN, default=0.0, tip="Mean curvature of the whole mesh, 1/length")

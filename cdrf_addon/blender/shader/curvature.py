@@ -19,16 +19,14 @@ from ..nodes.tree import Operand, Socket, Sockets, TreeBuilder
 from .variant import CONSTANT, FLAT, SCALED, Variant
 
 
-def surface_variance(b: TreeBuilder, variant: Variant, given: Sockets) -> Operand:
-    """Return the square of sigma = sigma0 kappa per channel, as a vector."""
+def surface_sigma(b: TreeBuilder, variant: Variant, given: Sockets) -> Operand:
+    """Return sigma = sigma0 kappa per channel, as a vector."""
     if variant.source == FLAT:
         return (0.0, 0.0, 0.0)
     if variant.source == CONSTANT:
         sigma = b.math("MULTIPLY", given[ids.SIGMA0], given[ids.CURVATURE])
-        width = b.vector("SCALE", given[ids.SIGMA0_RATIO], scale=sigma)
-    else:
-        width = _diffused_sigma(b, variant, given)
-    return b.vector("MULTIPLY", width, width)
+        return b.vector("SCALE", given[ids.SIGMA0_RATIO], scale=sigma)
+    return _diffused_sigma(b, variant, given)
 
 
 def _diffused_sigma(b: TreeBuilder, variant: Variant, given: Sockets) -> Socket:
@@ -46,9 +44,9 @@ def _diffused_sigma(b: TreeBuilder, variant: Variant, given: Sockets) -> Socket:
     return b.combine_channels(sigma)
 
 
-def level_nodes(b: TreeBuilder) -> dict[str, Socket]:
-    """Read a mesh's diffused curvature; return it by the inputs of `diffused_group`."""
-    levels = b.node("ShaderNodeAttribute", attribute_name=ids.DIFFUSED_ATTRIBUTE)
+def level_nodes(b: TreeBuilder, attribute: str = ids.DIFFUSED_ATTRIBUTE) -> dict[str, Socket]:
+    """Read what a mesh has at four lengths; return it by the inputs of `diffused_group`."""
+    levels = b.node("ShaderNodeAttribute", attribute_name=attribute)
     length = b.node("ShaderNodeAttribute", attribute_name=ids.LENGTH_ATTRIBUTE)
     return {
         ids.LEVELS: levels.outputs["Color"],

@@ -23,6 +23,7 @@ from ..nodes.detail import detail_group
 from ..nodes.reflectance import SEPARATE, reflectance_group
 from ..nodes.tables import Table
 from ..nodes.tree import Operand, Socket, Sockets, TreeBuilder
+from ..nodes.walk import haze_group
 from .variant import Variant
 
 # A channel narrower than a hundredth of the widest is Lambert in every row of the table.
@@ -42,17 +43,27 @@ class Surface:
     """Empty where no light depends on the normal."""
     variance: Operand
     """Square of sigma per channel; zero where the surface changes no light."""
+    haze: Operand | None = None
+    """What a random walk takes off the blur (nodes/walk.py), per channel; None for nothing."""
+
+
+def shading_normal(b: TreeBuilder, variant: Variant, given: Sockets) -> Socket:
+    """Return the geometry's normal, or the map's where one is connected."""
+    own = b.node("ShaderNodeNewGeometry").outputs["Normal"]
+    if not variant.mapped:
+        return own
+    mapped = given[ids.NORMAL]
+    # An unconnected input is a zero vector.
+    unset = b.math("LESS_THAN", b.vector("DOT_PRODUCT", mapped, mapped), 1e-12)
+    return b.vector("ADD", mapped, b.vector("SCALE", own, scale=unset))
 
 
 def surface_normals(b: TreeBuilder, variant: Variant, table: Table, given: Sockets) -> Normals:
     """Return the geometry's normal; under a map, blended with it as each channel keeps detail."""
-    own = b.node("ShaderNodeNewGeometry").outputs["Normal"]
+    mapped = shading_normal(b, variant, given)
     if not variant.mapped:
-        return {"RGB": own}
-    mapped = given[ids.NORMAL]
-    # An unconnected input is a zero vector.
-    unset = b.math("LESS_THAN", b.vector("DOT_PRODUCT", mapped, mapped), 1e-12)
-    mapped = b.vector("ADD", mapped, b.vector("SCALE", own, scale=unset))
+        return {"RGB": mapped}
+    own = b.node("ShaderNodeNewGeometry").outputs["Normal"]
     change = b.vector("SUBTRACT", mapped, own)
     ratio = b.separate_channels(given[ids.SIGMA0_RATIO])
     moments = dict(zip("RGB", table.moments, strict=True))
@@ -86,12 +97,19 @@ def reflectance_node(
         f per channel.
     """
     direction, variance = light.outputs[ids.DIRECTION], light.outputs[ids.VARIANCE]
-    return b.group(
+    cosine = _cosine(b, surface.normals, direction)
+    reflectance = b.group(
         reflectance_group(lookups, surface.table, own_cosines=len(surface.normals) > 1),
         f"Reflectance {name}",
-        Cosine=_cosine(b, surface.normals, direction),
+        Cosine=cosine,
         Variance=_total_variance(b, surface, variance, lookups),
     ).outputs[ids.REFLECTANCE]
+    if surface.haze is None:
+        return reflectance
+    node = b.group(
+        haze_group(), f"Haze {name}", Reflectance=reflectance, Haze=surface.haze, Cosine=cosine
+    )
+    return node.outputs[ids.LEFT]
 
 
 def per_channel(

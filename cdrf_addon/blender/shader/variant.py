@@ -52,6 +52,8 @@ class Variant:
     """Whether the lights' cast shadows fall on the surface, and how."""
     links: str = ""
     """The group's lights with light linking (`links_of` in material/linking.py); empty for none."""
+    walk: str = ""
+    """The random walk that makes it depend on the view (core/walk/view.py); empty for none."""
 
     @property
     def name(self) -> str:
@@ -64,6 +66,7 @@ class Variant:
             (self.shadows.cast, " shadows"),
             (self.shadows.edges, " coloured"),
             (self.links, " linked"),
+            (self.walk, " view"),
         )
         return f"CDRF {name_of(self.model)} {lookups}{source}" + "".join(
             text for present, text in extras if present
@@ -79,6 +82,7 @@ def variant_of(
     occluded: bool = False,
     shadows: ShadowChoice = NO_SHADOWS,
     links: str = "",
+    walk: str = "",
 ) -> Variant:
     """Choose the variant with one look-up for each distinct sigma0.
 
@@ -93,9 +97,10 @@ def variant_of(
         occluded: See `Variant`.
         shadows: See `Variant`.
         links: See `Variant`.
+        walk: See `Variant`.
     """
     if source == FLAT and not mapped:
-        return Variant("RGB", FLAT, model, False, occluded, shadows, links)
+        return Variant("RGB", FLAT, model, False, occluded, shadows, links, walk)
     red, green, blue = ratio
     if red == green == blue:
         channels = "RGB"
@@ -107,7 +112,7 @@ def variant_of(
         channels = "RB G"
     else:
         channels = "R G B"
-    return Variant(channels, source, model, mapped, occluded, shadows, links)
+    return Variant(channels, source, model, mapped, occluded, shadows, links, walk)
 
 
 def is_shader_group(group: bpy.types.ShaderNodeTree | None) -> bool:
@@ -126,6 +131,7 @@ def stamp_variant(group: bpy.types.ShaderNodeTree, variant: Variant) -> None:
     group[ids.SHADOW_KEY] = variant.shadows.cast
     group[ids.EDGE_KEY] = variant.shadows.edges
     group[ids.LINKS_KEY] = variant.links
+    group[ids.WALK_KEY] = variant.walk
 
 
 def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
@@ -141,4 +147,5 @@ def stamped_variant(group: bpy.types.ShaderNodeTree) -> Variant:
         bool(group.get(ids.OCCLUDED_KEY, False)),
         ShadowChoice(bool(group.get(ids.SHADOW_KEY, False)), bool(group.get(ids.EDGE_KEY, False))),
         group.get(ids.LINKS_KEY, ""),
+        group.get(ids.WALK_KEY, ""),
     )

@@ -25,6 +25,7 @@ from ..nodes.harmonics import bands_group, harmonics_group
 from ..nodes.lights import light_group
 from ..nodes.tables import Table
 from ..nodes.tree import Operand, Socket, Sockets, TreeBuilder
+from ..nodes.walk import hazed
 from ..world.light import WorldLight
 from .surface import Surface, per_channel, reflectance_node
 from .variant import FLAT, Variant
@@ -59,7 +60,7 @@ def add_world(
     bands = None
     if filters_world(variant, world, table):
         node = b.group(bands_group(variant.channels, table), "Bands", Variance=surface.variance)
-        bands = node.outputs
+        bands = node.outputs if surface.haze is None else hazed(b, node.outputs, surface.haze)
     rotation = _rotation(b, world)
     light = per_channel(b, surface.normals, _harmonics(b, world, bands, rotation))
     if environment.sun is not None:

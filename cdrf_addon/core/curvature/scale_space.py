@@ -17,6 +17,7 @@ import numpy as np
 
 from ..progress import portion
 from .diffusion import Diffusion
+from .estimators.tensor import shape_operator_steps
 
 if TYPE_CHECKING:
     from .field import CleanCurvature
@@ -28,11 +29,16 @@ LEVELS = 4
 LEVEL_RATIO = 4.0
 # Diffusion length over sigma0, measured against path tracing (docs/results/kappa_choice.md).
 LENGTH_PER_SIGMA0 = 2.0
+# Length of the mean curvature that decides the energy over that of kappa: what is absorbed on the
+# way out is gathered from further away than what blurs (docs/results/walk.md).
+MEAN_LENGTH = 2.0
+# Level at which the shape operator is kept: shorter ones hold the noise of the mesh.
+SHAPE_LEVEL = 1
 
 
 @dataclass(frozen=True)
 class KappaLevels:
-    """Curvature at several diffusion lengths, in the source's vertices and unit."""
+    """Curvedness at several diffusion lengths, in the source's vertices and unit."""
 
     values: Points
     """(N, LEVELS) kappa, 1/unit; column i at the length shortest * LEVEL_RATIO^i."""
@@ -47,7 +53,18 @@ class KappaLevels:
         return np.asarray((self.values * weights).sum(axis=1))
 
 
-def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels]:
+@dataclass(frozen=True)
+class DiffusedCurvature:
+    """All that is diffused of a surface's curvature, in the source's vertices and unit."""
+
+    kappa: KappaLevels
+    mean: Points
+    """(N, LEVELS) mean curvature with its sign, at the lengths of kappa, 1/unit."""
+    shape: Points
+    """(N, 6) the shape operator xx, xy, xz, yy, yz, zz at the length of SHAPE_LEVEL, 1/unit."""
+
+
+def level_steps(curvature: CleanCurvature) -> Generator[float, None, DiffusedCurvature]:
     """Diffuse the curvature of a mesh over lengths that follow its size, yielding the part done.
 
     First the mean and the Gaussian curvature over the shortest length: both are signed, so that the
@@ -69,15 +86,28 @@ def level_steps(curvature: CleanCurvature) -> Generator[float, None, KappaLevels
     shortest = diffusion.size() / LEVEL_RATIO**LEVELS
     k1, k2 = curvature.k1, curvature.k2
     mean, gaussian = yield from portion(
-        diffusion.steps(((k1 + k2) / 2.0, k1 * k2), shortest), 0.0, 0.5
+        diffusion.steps(((k1 + k2) / 2.0, k1 * k2), shortest), 0.0, 0.4
     )
     # No two curvatures may have these averages as their sum and product; then k1 = k2.
     kappa = np.sqrt(np.maximum(2.0 * mean**2 - gaussian, mean**2))
     # With obtuse triangles a step is not quite an average, and may overshoot.
     kappa = np.minimum(kappa, np.sqrt((k1**2 + k2**2).max() / 2.0))
-    fields = [kappa]
+    kappas, means = [kappa], [mean]
+    shape = yield from portion(shape_operator_steps(mesh), 0.4, 0.5)
     for level in range(1, LEVELS):
-        steps = diffusion.steps([kappa], shortest * LEVEL_RATIO**level, fields[-1:])
-        fields += yield from portion(steps, 0.3 + 0.2 * level, 0.5 + 0.2 * level)
-    columns = [mesh.to_source(values) / mesh.edge for values in fields]
-    return KappaLevels(np.stack(columns, axis=1), mesh.to_source(shortest, loose=1.0) * mesh.edge)
+        length = shortest * LEVEL_RATIO**level
+        fields, starts = [kappa, mean], [kappas[-1], means[-1]]
+        if level == SHAPE_LEVEL:
+            fields, starts = fields + shape, starts + shape
+        steps = diffusion.steps(fields, length, starts)
+        found = yield from portion(steps, 0.3 + 0.2 * level, 0.5 + 0.2 * level)
+        kappas.append(found[0])
+        means.append(found[1])
+        if level == SHAPE_LEVEL:
+            shape = found[2:]
+
+    def columns(fields: list[Points]) -> Points:
+        return np.stack([mesh.to_source(values) / mesh.edge for values in fields], axis=1)
+
+    lengths = mesh.to_source(shortest, loose=1.0) * mesh.edge
+    return DiffusedCurvature(KappaLevels(columns(kappas), lengths), columns(means), columns(shape))

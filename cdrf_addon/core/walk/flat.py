@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..scattering import LEGACY, RANDOM_WALK, SKIN
+from ..scattering.node_radius import LEGACY, RANDOM_WALK, SKIN
 from .chandrasekhar import chandrasekhar_h, cut_off, escape
 from .entry import entry
 from .medium import BOUNCES, Medium, medium, van_de_hulst

@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..dipole import mismatch
 from ..errors import ParameterError
-from ..scattering import BURLEY, LEGACY, OLD_FREE_PATH, RANDOM_WALK, SKIN
+from ..scattering.dipole import mismatch
+from ..scattering.node_radius import BURLEY, LEGACY, OLD_FREE_PATH, RANDOM_WALK, SKIN
 from .entry import LEAST_IOR, MOST_IOR
 
 if TYPE_CHECKING:

@@ -32,8 +32,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..heat_kernel import sphere_reflectance
-from ..scattering import BURLEY, RANDOM_WALK
+from ..reflectance.sphere_model import sphere_reflectance
+from ..scattering.node_radius import BURLEY, RANDOM_WALK
 from .flat import TAIL_POWERS, FlatFit, flat_fit
 from .medium import BOUNCES
 

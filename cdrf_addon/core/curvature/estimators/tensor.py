@@ -22,6 +22,14 @@ if TYPE_CHECKING:
     from ..tri_mesh import Mask, Points
 
 
+# What overflows on needles becomes infinite or NaN, and is replaced like any value above the limit.
+_allow_overflow = np.errstate(over="ignore", invalid="ignore", divide="ignore")
+PARTS = 6
+"""Entries of a symmetric tensor that count: xx, xy, xz, yy, yz, zz."""
+# Curvature radii below this part of the median edge are noise, not shape.
+TENSOR_LIMIT = 1e3
+
+
 def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
     """Estimate at every vertex, yielding the part done.
 
@@ -30,6 +38,38 @@ def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
 
     Returns:
         Principal curvatures per unit of the clean mesh.
+    """
+    total, normals, sound = yield from _total_steps(mesh)
+    k1, k2 = _principal(total, normals)
+    yield 1.0
+    return Estimate(k1, k2, sound & ~mesh.seam)
+
+
+def shape_operator_steps(mesh: CleanMesh) -> Generator[float, None, list[Points]]:
+    """Return the shape operator in space, PARTS arrays (n,), yielding the part done.
+
+    dN = S dP along the surface: its eigenvalues are the principal curvatures, positive where the
+    surface bulges outwards, and zero along the normal. Finite, and zero where nothing can be said.
+    """
+    total, _, sound = yield from _total_steps(mesh)
+    yield 1.0
+    return _known_entries(total, sound & ~mesh.seam)
+
+
+@_allow_overflow
+def _known_entries(total: Points, sound: Mask) -> list[Points]:
+    """Return the mean tensor at each vertex, PARTS arrays (n,); zero where it is not sound."""
+    entries = total[:PARTS] / np.maximum(total[PARTS], np.finfo(np.float64).tiny)
+    known = sound & (np.abs(entries) <= TENSOR_LIMIT).all(axis=0)
+    return list(np.where(known, entries, 0.0))
+
+
+def _total_steps(mesh: CleanMesh) -> Generator[float, None, tuple[Points, Points, Mask]]:
+    """Sum the tensors of the faces at every vertex, yielding the part done.
+
+    Returns:
+        (PARTS + 1, n): the sums weighted by area, then the weights; the normals (n, 3); and where
+        they do not cancel out (n,).
     """
     vertices, triangles = mesh.vertices, mesh.triangles
     count = len(vertices)
@@ -45,7 +85,7 @@ def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
     e, f, g = _second_form(edges, at_corner, along, across)
     yield 0.6
     weights = _voronoi_corners(edges, doubled_area)
-    total = np.zeros((7, count))
+    total = np.zeros((PARTS + 1, count))
     for corner in range(3):
         turned = [_turned(axis, unit, at_corner[corner]) for axis in (along, across)]
         one_corner = np.zeros((len(triangles), 3))
@@ -53,13 +93,7 @@ def tensor_steps(mesh: CleanMesh) -> Generator[float, None, Estimate]:
             one_corner[:, corner] = weights[corner] * entry
             total[row] += scatter(triangles, one_corner, count)
         yield 0.6 + 0.13 * corner
-    k1, k2 = _principal(total, normals)
-    yield 1.0
-    return Estimate(k1, k2, sound & ~mesh.seam)
-
-
-# What overflows on needles becomes infinite or NaN, and is replaced like any value above the limit.
-_allow_overflow = np.errstate(over="ignore", invalid="ignore", divide="ignore")
+    return total, normals, sound
 
 
 @_allow_overflow
@@ -75,7 +109,7 @@ def _tensor(form: tuple[Points, Points, Points], u: Points, v: Points) -> list[P
 @_allow_overflow
 def _principal(total: Points, normals: Points) -> tuple[Points, Points]:
     """Return the principal curvatures of the mean tensor at each vertex, (n,) each."""
-    xx, xy, xz, yy, yz, zz = total[:6] / np.maximum(total[6], np.finfo(np.float64).tiny)
+    xx, xy, xz, yy, yz, zz = total[:PARTS] / np.maximum(total[PARTS], np.finfo(np.float64).tiny)
     # The tensor has no part along the normal: k1 and k2 are half its trace, more or less the size
     # of what is left in the tangent plane without that half.
     half = (xx + yy + zz) / 2.0
