@@ -244,7 +244,7 @@ def _shape_steps(work: MeshWork, shape: Shape) -> Generator[float, None, VertexC
         diffused = yield from portion(level_steps(cleaned), 0.75, 1.0)
         levels, shortest = diffused.kappa.values, diffused.kappa.shortest
         means = diffused.mean
-        shape_operator = _as_stored(diffused.shape)
+        shape_operator = _as_stored(shape.in_object_axes(diffused.shape))
     return VertexCurvature(
         _as_stored(principal),
         _as_stored(levels),

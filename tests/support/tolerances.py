@@ -23,6 +23,11 @@ SHADER = Bound(
     3e-5,
     "bilinear look-up: 6.5e-5 in the ideal (core/reflectance/lut.py), float32 arithmetic 1e-6",
 )
+WALK = Bound(
+    3e-4,
+    1e-4,
+    "the look-up's 1e-4 times a gain of up to 1.5; the walk's formulas in float32, to 1e-5",
+)
 FOUR_LIGHTS = Bound(
     1e-3,
     3e-4,

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 ESTIMATOR_VERSION = 3
 
 
+# Entries of a (3, 3) matrix, row by row, in xx, xy, xz, yy, yz, zz.
+_SYMMETRIC = (0, 1, 2, 1, 3, 4, 2, 4, 5)
+
+
 @dataclass(frozen=True)
 class Shape:
     """What the curvature of an object depends on: its evaluated surface, in world units."""
@@ -36,6 +40,22 @@ class Shape:
     """Hash of the evaluated surface before the object's transform."""
     metric: NDArray[np.float64]
     """M^T M of the transform, (3, 3): equal for objects that differ by a rotation only."""
+    axes: NDArray[np.float64]
+    """The object's axes in the world, (3, 3) by columns: M without its scale and shear."""
+
+    def in_object_axes(self, tensors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Turn symmetric tensors from the world's axes into the object's.
+
+        Args:
+            tensors: (n, 6) xx, xy, xz, yy, yz, zz.
+
+        Returns:
+            The same of A^T S A.
+        """
+        matrix = tensors[:, _SYMMETRIC].reshape(-1, 3, 3)
+        turned = self.axes.T @ matrix @ self.axes
+        rows, columns = np.triu_indices(3)
+        return np.asarray(turned[:, rows, columns])
 
     def size_relative_to(self, other: Shape) -> float | None:
         """Return how many times as large this is, or None if it is not the same shape scaled."""
@@ -49,6 +69,12 @@ class Shape:
 def linear_part(placed: bpy.types.Object) -> NDArray[np.float64]:
     """Return scale, rotation and shear of an object or instance, (3, 3)."""
     return np.array(placed.matrix_world, dtype=np.float64)[:3, :3]
+
+
+def axes_of(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the orthogonal factor of a linear part's polar decomposition, (3, 3)."""
+    left, _, right = np.linalg.svd(linear)
+    return np.asarray(left @ right)
 
 
 def metric_of(placed: bpy.types.Object) -> NDArray[np.float64]:
@@ -142,7 +168,8 @@ def read_shape(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: O
     )
     with np.errstate(invalid="ignore", over="ignore"):
         world = local.astype(np.float64) @ linear.T
-    return Shape(TriMesh.from_arrays(world, faces), fingerprint, local_fingerprint, metric)
+    placed = TriMesh.from_arrays(world, faces)
+    return Shape(placed, fingerprint, local_fingerprint, metric, axes_of(linear))
 
 
 @contextmanager
