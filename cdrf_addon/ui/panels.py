@@ -21,7 +21,7 @@ from ..blender.world.surface import FIXED, SCALED
 from ..compat import EEVEE, HAS_RAYCAST
 from ..core.curvature.estimators import METHODS
 from ..core.curvature.summary import CONSTANT, FLAT, VARYING
-from ..core.reflectance.model import MODEL_ITEMS, PROFILE
+from ..core.reflectance.model import MODEL_ITEMS, PROFILE, SPHERE
 
 _MOST_LINES = 6
 
@@ -76,11 +76,14 @@ def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None
     kind = kind_of_model(material)
     name = next(label for key, label, *_ in MODEL_ITEMS if key == kind)
     row = layout.row(align=True)
-    row.operator_menu_enum("cdrf.set_model", "model", text=name, icon="SHADING_TEXTURE")
+    row.menu("CDRF_MT_model", text=name, icon="SHADING_TEXTURE")
     row.operator_menu_enum("cdrf.preset", "preset", text="Preset", icon="PRESET")
     row.operator("cdrf.read_shader", text="", icon="EYEDROPPER")
     row = layout.row(align=True)
-    row.operator("cdrf.measure", icon="RENDER_STILL")
+    if kind == SPHERE:
+        switch = row.row(align=True)
+        switch.enabled = material.is_editable
+        switch.prop(material.cdrf, "view_dependence", toggle=True, icon="HIDE_OFF")
     row.operator("cdrf.fit", icon="GRAPH")
     if kind == PROFILE:
         column = layout.column()

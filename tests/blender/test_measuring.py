@@ -133,7 +133,7 @@ def test_a_deleted_measured_table_is_said(material: bpy.types.Material) -> None:
     assert table is not None
     bpy.data.images.remove(table.image)
     key, sentence = ensure_chosen(material)
-    assert key == SPHERE and "Measure again" in sentence
+    assert key == SPHERE and "measure it again" in sentence
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     assert material.cdrf.model == SPHERE
 
