@@ -42,6 +42,12 @@ class CDRF_OT_set_model(OnTranslucentMaterial):
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
+    @classmethod
+    def description(
+        cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties
+    ) -> str:
+        return next(tip for kind, _, tip in MODEL_ITEMS if kind == properties.model)
+
     def draw(self, _context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
         for kind in OFFERED_KINDS:
