@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -17,7 +18,7 @@ from cdrf_addon.compat import ensure_node_tree, walk_method
 from cdrf_addon.core.reflectance.model import MEASURED, MODEL_ITEMS, OFFERED_KINDS, RING, SPHERE
 from cdrf_addon.core.scattering.presets import PRESETS
 from cdrf_addon.core.walk.material import DEFAULT_WALK, MaterialWalk, free_path_ratio
-from cdrf_addon.ui.operators.model import CDRF_MT_model
+from cdrf_addon.ui.operators.model import CDRF_MT_model, CDRF_OT_set_model
 
 # Sockets hold float32.
 STORED = 1e-6
@@ -215,6 +216,13 @@ def test_the_menu_offers_three_and_the_first_switches_it_on(rig: Rig) -> None:
     assert bpy.ops.cdrf.set_model(model=SPHERE, view_dependence=True) == {"FINISHED"}
     assert own.view_dependence and own.model == SPHERE
     assert due(obj) == []
+
+
+def test_each_model_in_the_menu_has_its_own_tooltip(rig: Rig) -> None:
+    tips = {kind: tip for kind, _, tip in MODEL_ITEMS}
+    for kind in OFFERED_KINDS:
+        properties = SimpleNamespace(model=kind)
+        assert CDRF_OT_set_model.description(bpy.context, properties) == tips[kind]
 
 
 def test_a_sphere_gets_its_mean_curvature_without_update(rig: Rig) -> None:
