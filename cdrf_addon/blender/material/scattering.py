@@ -142,8 +142,10 @@ def _walk(
 
     # The skin variant enters as through a rough surface, whatever the node's roughness.
     roughness = 1.0 if method == SKIN else number("Roughness", 1.0)
+    # Cycles takes the square of the Principled BSDF's roughness, and the other node's as it is.
+    alpha = roughness**2 if node.type == "BSDF_PRINCIPLED" else roughness
     index = "Subsurface IOR" if method == SKIN else "IOR"
-    return MaterialWalk(method, roughness**2, number(index, 1.4), number(anisotropy, 0.0))
+    return MaterialWalk(method, alpha, number(index, 1.4), number(anisotropy, 0.0))
 
 
 def _number(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> float:
