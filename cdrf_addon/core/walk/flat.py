@@ -20,7 +20,7 @@ import numpy as np
 from ..scattering.node_radius import LEGACY, RANDOM_WALK, SKIN
 from .chandrasekhar import chandrasekhar_h, cut_off, escape
 from .entry import entry
-from .medium import BOUNCES, Medium, medium, van_de_hulst
+from .medium import BOUNCES, WalkMedium, medium, van_de_hulst
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -36,7 +36,7 @@ _COSINE_WEIGHTS = _WEIGHTS * ((_NODES + 1.0) / 2.0) ** 3 * 2.0
 
 
 def flat_radiance(
-    mu: ArrayLike, walk: Medium, bounces: float = BOUNCES
+    mu: ArrayLike, walk: WalkMedium, bounces: float = BOUNCES
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Radiance of a plane under light of irradiance pi, by view and channel.
 
@@ -59,7 +59,7 @@ def flat_radiance(
     return shown * walk.darkening, white[:, None] * tail * walk.darkening
 
 
-def flat_gain(mu: ArrayLike, walk: Medium, bounces: float = BOUNCES) -> NDArray[np.float64]:
+def flat_gain(mu: ArrayLike, walk: WalkMedium, bounces: float = BOUNCES) -> NDArray[np.float64]:
     """G(mu) of a plane, Lambert's radiance being 1, by view and channel (v, c).
 
     A black channel has the limit of dark ones.
@@ -70,7 +70,7 @@ def flat_gain(mu: ArrayLike, walk: Medium, bounces: float = BOUNCES) -> NDArray[
     return np.asarray((shown - lost) / colour)
 
 
-def depths(mu: ArrayLike, walk: Medium) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def depths(mu: ArrayLike, walk: WalkMedium) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mean direction in which light enters, by view.
 
     Returns:
@@ -163,7 +163,7 @@ def flat_fit(
 
 
 def _mean(
-    views: NDArray[np.float64], walk: Medium, table: NDArray[np.float64]
+    views: NDArray[np.float64], walk: WalkMedium, table: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Mean over the directions of entry of what `table` has at their cosines, (v,)."""
     ways = entry(views, walk.alpha, walk.ior)
@@ -172,7 +172,7 @@ def _mean(
     return (1.0 - walk.diffuse) * refracted + walk.diffuse * diffuse
 
 
-def _at(walk: Medium, colour: NDArray[np.float64]) -> Medium:
+def _at(walk: WalkMedium, colour: NDArray[np.float64]) -> WalkMedium:
     """Same medium, its dark channels those of `colour`, and never raised or darkened."""
     albedo = np.maximum(walk.single_scattering * walk.darkening, 1.0 - van_de_hulst(colour) ** 2)
     return replace(walk, colour=colour, single_scattering=albedo, darkening=np.ones_like(albedo))

@@ -48,7 +48,7 @@ SKIN_DIFFUSE = 0.5
 
 
 @dataclass(frozen=True)
-class Medium:
+class WalkMedium:
     """What walks in, for any number of channels; every array is of the colour's shape."""
 
     method: str
@@ -147,7 +147,7 @@ def random_walk(
     anisotropy: float = 0.0,
     alpha: float = 1.0,
     ior: float = 1.4,
-) -> Medium:
+) -> WalkMedium:
     """Random Walk of 5.2 and later: van de Hulst's albedo, the radius itself as the free path."""
     g = min(max(float(anisotropy), -MOST_ANISOTROPY), MOST_ANISOTROPY)
     square = van_de_hulst(colour) ** 2
@@ -161,7 +161,7 @@ def legacy(
     anisotropy: float = 0.0,
     alpha: float = 1.0,
     ior: float = 1.4,
-) -> Medium:
+) -> WalkMedium:
     """Random Walk (Legacy) of 5.2 and later, and Random Walk up to 5.1.
 
     4.5 ends the anisotropy at 0; negative ones are van de Hulst's in the newer ones.
@@ -177,7 +177,7 @@ def skin(
     anisotropy: float = 0.0,
     alpha: float = 1.0,
     ior: float = 1.4,
-) -> Medium:
+) -> WalkMedium:
     """Random Walk (Skin): its roughness is always 1, and half of its walks know no view.
 
     The radius times sqrt(3 (1 - a')), a' the albedo of the dipole with that colour (Jensen et al.
@@ -196,7 +196,7 @@ def burley(
     anisotropy: float = 0.0,
     alpha: float = 1.0,
     ior: float = 1.4,
-) -> Medium:
+) -> WalkMedium:
     """Christensen-Burley: `mean_free_path` is the profile's d (Christensen and Burley 2015)."""
     a = np.clip(np.asarray(colour, dtype=np.float64), 0.0, 1.0)
     d = np.asarray(radius) * OLD_FREE_PATH / (1.9 - a + 3.5 * (a - 0.8) ** 2)
@@ -213,7 +213,7 @@ def medium(
     alpha: float = 1.0,
     ior: float = 1.4,
     version: tuple[int, int] = (5, 2),
-) -> Medium:
+) -> WalkMedium:
     """Return the medium of a node, by Blender's name of its method.
 
     Args:
@@ -274,11 +274,11 @@ def _medium(
     alpha: float,
     ior: float,
     diffuse: float = 0.0,
-) -> Medium:
+) -> WalkMedium:
     a = np.clip(np.asarray(colour, dtype=np.float64), 0.0, 1.0)
     a, albedo, path = np.broadcast_arrays(a, albedo, np.asarray(path, dtype=np.float64))
     walked = np.maximum(albedo, LEAST_ALBEDO)
-    return Medium(
+    return WalkMedium(
         method,
         a,
         walked * (1.0 - g) / (1.0 - walked * g),

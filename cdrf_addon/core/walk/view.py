@@ -6,13 +6,13 @@ Per channel, A the colour, l the mean free path, H the mean curvature and kappa 
     L = E_light / pi * reflected(A, mu, l H) * kernel(N'.L; width, haze)
     N' = normalize(N - k S l (V - mu N)),  k = tilt(A, mu, l kappa)
 
-* `reflected` is A G E: what comes out at all. G is the flat limit's (core/walk/flat.py). Where the
+- `reflected` is A G E: what comes out at all. G is the flat limit's (core/walk/flat.py). Where the
   surface bulges less is absorbed before light gets out: R = F (D + z) / (D + F z), F = A G and
   D = 1 - F, is F at z = 0 and 1 at z = infinity: no energy is won. Hollows give back
   R = F / (1 + h l |H|). What walks without an end would add to a plane falls off where the surface
   bulges: in a small body none is that long.
-* `tilt`: light that entered along the view is gathered beside the pixel.
-* `kernel` is the sphere's f(angle, width) less haze (c + 5/4 (c^2 - 1/3)), c = N'.L: exits have a
+- `tilt`: light that entered along the view is gathered beside the pixel.
+- `kernel` is the sphere's f(angle, width) less haze (c + 5/4 (c^2 - 1/3)), c = N'.L: exits have a
   longer tail than a Gaussian, and the two lowest harmonics hold it. Its mean over all lights is
   1/4 as that of f, and it costs no second look-up.
 
