@@ -116,7 +116,7 @@ def test_names_for_scripts_exist():
     operators = set(re.findall(r"bpy\.ops\.(cdrf\.\w+)\(", page))
     properties = set(re.findall(r"material\.cdrf\.(\w+)", page))
     attributes = set(re.findall(r"`(cdrf_\w+)`", page)) - {"cdrf_addon"}
-    assert len(operators) >= 5 and len(properties) >= 5 and len(attributes) == 3
+    assert len(operators) >= 5 and len(properties) >= 5 and len(attributes) == 6
     assert all(f'bl_idname = "{name}"' in sources for name in operators)
     assert all(re.search(rf"\b{name}: \w+Property\(", sources) for name in properties)
     assert all(f'"{name}"' in ids for name in attributes)
