@@ -47,7 +47,7 @@ def seen(walks: int, seed: int) -> tuple[Values, Values]:
                 angle = np.radians(degrees - side * np.array(BETWEEN))
                 lights = np.stack((np.sin(angle), 0.0 * angle, np.cos(angle)), axis=1)
                 shown = out.radiance(weights, lights) / COLOUR
-                halves[half, :, list(ANGLES).index(side * degrees)] = shown
+                halves[half, :, int(np.searchsorted(ANGLES, side * degrees))] = shown
     noise = ((halves[0] - halves[1]) ** 2).mean(axis=1) / 4.0
     return halves.mean(axis=0), np.asarray(noise)
 
@@ -87,7 +87,8 @@ def measure(walks: int, seed: int) -> dict[str, Any]:
     }
     for name in ("ring", "sphere"):
         widths = np.linspace(0.0, 1.0, 101)
-        best = min(widths, key=lambda width, name=name: float((missed(name, width) ** 2).sum()))
+        sums = [float((missed(name, width) ** 2).sum()) for width in widths]
+        best = widths[int(np.argmin(sums))]
         rows[f"{name}, best width"] = {"rms": missed(name, best).tolist(), "sigma": float(best)}
     return {
         "colour": COLOUR,

@@ -28,10 +28,10 @@ def page(results: dict[str, Any]) -> str:
         "",
         f"Measured with: {facts(results['machine'])}. NumPy alone, no Blender.",
         "",
-        "What [the model](../theory/walk.md) misses. Errors are RMS of the radiance over A, a Lambert",
-        "under a sun of irradiance π showing A · N·L; the squared Monte-Carlo error is taken off the",
-        "squared error, and *< noise* stands where nothing is left. Method: Cycles' *Random Walk* of",
-        "Blender 5.2 (`RANDOM_WALK`).",
+        "What [the model](../theory/walk.md) misses. Errors are RMS of the radiance over A, a",
+        "Lambert under a sun of irradiance π showing A · N·L; the squared Monte-Carlo error is",
+        "taken off the squared error, and *< noise* stands where nothing is left. Method: Cycles'",
+        "*Random Walk* of Blender 5.2 (`RANDOM_WALK`).",
         "",
         *_spheres(results),
         *_planes(results),
@@ -51,10 +51,11 @@ def _spheres(results: dict[str, Any]) -> list[str]:
     lines = [
         "## Spheres of another program",
         "",
-        "16 points all over a ball's picture, a sun at 0° to 165° from the view, roughness 1, index",
-        "1.4. The walks are stored in `tests/data/walk_spheres.json`: another program (compiled by",
-        "numba, Russian roulette, walks without an end), another seed, 2 × 10,000 walks a point. The",
-        "model's end of walks is switched off here. Lambert's error in brackets.",
+        "16 points all over a ball's picture, a sun at 0° to 165° from the view, roughness 1,",
+        "index 1.4. The walks are stored in `tests/data/walk_spheres.json`: another program",
+        "(compiled by numba, Russian roulette, walks without an end), another seed, 2 × 10,000",
+        "walks a point. The model's end of walks is switched off here. Lambert's error in",
+        "brackets.",
         "",
     ]
     cells = []
@@ -70,13 +71,13 @@ def _spheres(results: dict[str, Any]) -> list[str]:
 def _planes(results: dict[str, Any]) -> list[str]:
     from .measure import PLANE_MU
 
-    worst = {name: 0.0 for name in ("exact", "fit")}
+    worst = {"exact": 0.0, "fit": 0.0}
     mean = dict(worst)
     cells, count = [], 0
     for a, found in results["planes"].items():
         line = [a]
         for i, rendered in enumerate(found["rendered"]):
-            line.append(f"{rendered:.3f} / {found['exact'][i]:.4g} / {found['fit'][i]:.4g}")
+            line.append(f"{rendered:.3f} / {found['exact'][i]:.3f} / {found['fit'][i]:.3f}")
             count += 1
             for name in worst:
                 off = abs(found[name][i] - rendered)
@@ -85,12 +86,12 @@ def _planes(results: dict[str, Any]) -> list[str]:
     return [
         "## Planes rendered by Cycles",
         "",
-        "G, what a plane shows over Lambert's. Rendered by Cycles 5.2 without a denoiser (noise about",
-        "0.002) / exact by quadrature / as the shader has it.",
+        "G, what a plane shows over Lambert's. Rendered by Cycles 5.2 without a denoiser (noise",
+        "about 0.002) / exact by quadrature / as the shader has it.",
         "",
         *table(["A", *(f"μ = {mu:g}" for mu in PLANE_MU)], cells),
-        f"Off the rendered planes on average {mean['exact'] / count:.4f}, worst {worst['exact']:.4f}",
-        f"(exact), {mean['fit'] / count:.4f} and {worst['fit']:.4f} (shader).",
+        f"Off the rendered planes on average {mean['exact'] / count:.4f}, worst",
+        f"{worst['exact']:.4f} (exact), {mean['fit'] / count:.4f} and {worst['fit']:.4f} (shader).",
         "",
     ]
 
@@ -109,11 +110,11 @@ def _figure(results: dict[str, Any]) -> list[str]:
         "",
         f"A sphere of A = {found['colour']:g}, ℓκ = {found['curved']:g}, roughness 1, index 1.4; N",
         "runs along the circle through the view and the light, each 5° to 85° to both sides of the",
-        f"view. {found['walks']:,} walks a point, seeded (`core/walk/sphere_walk.py`), none of them",
-        f"used in a fit. Ring and sphere at σ = {found['sigma']:.3g}, as this material's radius gives",
-        "it; below them at the σ that fits best over all five.",
+        f"view. {found['walks']:,} walks a point, seeded (`core/walk/sphere_walk.py`), none of",
+        f"them used in a fit. Ring and sphere at σ = {found['sigma']:.3g}, as this material's",
+        "radius gives it; below them at the σ that fits best over all five.",
         "",
-        "![What each model misses along the circle, a panel for each angle from the view to the light]"
+        "![What each model misses, a panel for each angle from the view to the light]"
         "(images/walk-figure2.svg)",
         "",
         *table(["RMS / A", *(f"{between}°" for between in found["between"])], cells),
@@ -128,16 +129,16 @@ def _knee(results: dict[str, Any]) -> list[str]:
     return [
         "## How many numbers",
         "",
-        "Each step with its own fit of width, tilt and haze, to this command's walks at roughness 1",
-        "and index 1.4; judged on the spheres of the other program, RMS over all A. Energy is as it",
-        "ships. The flat limit G is computed and counts for nothing; the five numbers of hollows do",
-        "not show on spheres (33 in all).",
+        "Each step with its own fit of width, tilt and haze, to this command's walks at roughness",
+        "1 and index 1.4; judged on the spheres of the other program, RMS over all A. Energy is as",
+        "it ships. The flat limit G is computed and counts for nothing; the five numbers of",
+        "hollows do not show on spheres (33 in all).",
         "",
         *table(["terms", "numbers", *_ranges()], cells),
-        "Energy and a tilt take most of the error away; the haze takes a third of what is left. The",
-        "further numbers of tilt, haze and width carry the colour and, by the depth of entry, other",
-        "roughness and index, of which this table has only one. More would gain at ℓκ > 0.2 only,",
-        "where one normal and one width stop standing for the exits at all.",
+        "Energy and a tilt take most of the error away; the haze takes a third of what is left.",
+        "The further numbers of tilt, haze and width carry the colour and, by the depth of entry,",
+        "other roughness and index, of which this table has only one. More would gain at ℓκ > 0.2",
+        "only, where one normal and one width stop standing for the exits at all.",
         "",
     ]
 
@@ -165,11 +166,11 @@ def _refit(results: dict[str, Any]) -> list[str]:
         "## Where the numbers come from",
         "",
         "Those that ship (`core/walk/view.py`) were fitted by the same formulas and weights to",
-        "100,000 to 200,000 walks a view, made by a compiled copy of the walk that is not part of this",
-        f"repository. This command fits to 2 × {results['walks']:,} walks a view in NumPy. It does not",
-        "give the digits that ship: the nine numbers of `GAIN` trade against each other. It gives a",
-        "similar error on the other program's spheres, and `./dev bench walk --judge` gives the error",
-        "of what ships on walks of this repository:",
+        "100,000 to 200,000 walks a view, made by a compiled copy of the walk that is not part of",
+        f"this repository. This command fits to 2 × {results['walks']:,} walks a view in NumPy. It",
+        "does not give the digits that ship: the nine numbers of `GAIN` trade against each other.",
+        "It gives a similar error on the other program's spheres, and `./dev bench walk --judge`",
+        "gives the error of what ships on walks of this repository:",
         "",
         *table(["coefficients", *_ranges()], errors),
         *table(["", "shipped", "fitted here"], cells),
@@ -180,8 +181,8 @@ def _judged(results: dict[str, Any]) -> list[str]:
     lines = [
         "## Other roughness, index and colour",
         "",
-        f"Own walks, 2 × {results['walks']:,} a view, of another seed than the fit's. All views, 40",
-        "suns. The noise that is taken off is that of A = 0.34.",
+        f"Own walks, 2 × {results['walks']:,} a view, of another seed than the fit's. All views,",
+        "40 suns. The noise that is taken off is that of A = 0.34.",
         "",
     ]
     for found in results["judged"]:
@@ -244,7 +245,7 @@ def _costs(results: dict[str, Any]) -> list[str]:
         "machine that was doing",
         f"other work: {found['walk seconds']:.0f} s for the walks of the fit, "
         f"{found['fit seconds']:.0f} s for the fit. What ships is 33 numbers, 264",
-        "bytes, and no table. A material of a roughness or index not met before needs its flat limit",
-        f"once: {results['flat seconds']:.2f} s.",
+        "bytes, and no table. A material of a roughness or index not met before needs its flat",
+        f"limit once: {results['flat seconds']:.2f} s.",
         "",
     ]
