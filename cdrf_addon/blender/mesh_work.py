@@ -31,7 +31,6 @@ from .material.install import cdrf_node
 from .material.translucent import materials_on
 from .mesh.attributes import (
     VertexCurvature,
-    has_curvature,
     has_walk_curvature,
     mark_filled,
     remove_curvature,
@@ -305,7 +304,7 @@ def store(work: MeshWork, sources: Mapping[bpy.types.Material, str]) -> None:
     elif work.curvature is not None:
         write_curvature(mesh, work.curvature)
         mark_filled(mesh, work.curvature)
-    elif not has_curvature(mesh):
+    elif not has_walk_curvature(mesh):
         # A constant mesh that now shares its material with one that is not.
         write_curvature(mesh, VertexCurvature.constant(len(mesh.vertices), work.mean_values))
     for obj in work.users:

@@ -14,6 +14,7 @@ from .material import linking
 from .material.install import remove, require_editable
 from .material.shader_group import remove_unused
 from .material.translucent import translucent_materials_of, translucent_materials_on
+from .material.walk import keep_free_path
 from .mesh.attributes import remove_curvature
 
 
@@ -35,6 +36,7 @@ def remove_translucency(
     users = [obj for obj in bpy.data.objects if chosen & set(translucent_materials_on(obj))]
     for material in chosen:
         show_surface(material)
+        keep_free_path(material)
         remove(material)
     _end_unused_display(context)
     for obj in users:

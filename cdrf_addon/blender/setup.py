@@ -28,7 +28,7 @@ from .material.shader_group import remove_unused
 from .material.shadow_choice import choose_shadows
 from .material.specular import add_specular
 from .material.translucent import materials_on, translucent_materials_of
-from .material.walk import walk_for
+from .material.walk import ON, UNSET, walk_for, write_mean_curvature
 from .mesh_work import (
     MeshWork,
     group_by_mesh,
@@ -242,9 +242,7 @@ class Setup:
         if source == CONSTANT:
             kappas = [each.mean_values[0] for each in work]
             node.inputs[ids.CURVATURE].default_value = float(np.mean(kappas))
-            if ids.MEAN in node.inputs:
-                means = [each.mean_values[3] for each in work]
-                node.inputs[ids.MEAN].default_value = float(np.mean(means))
+            write_mean_curvature(material, [each.mesh for each in work])
 
     def _variant(
         self, material: bpy.types.Material, source: str, lights: list[SceneLight]
@@ -280,9 +278,13 @@ class Setup:
         """Give a new node what was chosen before, what its nodes scatter, or a first guess."""
         settings.write_to_node(material)
         if own is not None:
+            chosen = material.cdrf.chosen_view
             set_scattering(material, own)
+            if chosen != UNSET:
+                settings.set_view_dependent(material, chosen == ON)
             self.report.read.append(material.name)
-            self.report.warnings += [f"'{material.name}': {note}" for note in own.notes]
+            notes = own.notes_for(settings.is_view_dependent(material))
+            self.report.warnings += [f"'{material.name}': {note}" for note in notes]
         elif not settings.is_sigma0_chosen(material):
             settings.set_sigma0(material, _first_sigma0(work))
 

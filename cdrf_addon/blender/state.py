@@ -235,10 +235,18 @@ def _variant_reasons(
 
 def _attribute_reasons(obj: bpy.types.Object, node: bpy.types.ShaderNode) -> list[str]:
     variant = stamped_variant(node.node_tree)
-    has_all = has_walk_curvature if variant.walk else has_curvature
-    if variant.source in {ATTRIBUTE, SCALED} and not has_all(obj.data):
+    if variant.source not in {ATTRIBUTE, SCALED}:
+        return []
+    if not has_curvature(obj.data):
         return [f"'{obj.name}' has no curvature yet."]
-    return []
+    if not variant.walk or has_walk_curvature(obj.data):
+        return []
+    if obj.data.is_editable:
+        return [f"'{obj.name}' has not yet the curvature that View Dependence needs."]
+    return [
+        f"The mesh of '{obj.name}' is linked from a file without the curvature that View "
+        "Dependence needs: press Update there."
+    ]
 
 
 def _shape_reasons(

@@ -200,7 +200,9 @@ def make_parser() -> argparse.ArgumentParser:
     add("--ratio", type=_factor, nargs=3, metavar=("R", "G", "B"),
         help="scatter distance of red, green, blue as factors of sigma0")  # fmt: skip
     add("--model", choices=[key for key, *_ in MODEL_ITEMS],
-        help="model of reflectance (default: the file's; SPHERE for mesh files)")  # fmt: skip
+        help="SPHERE is the panel's Path-Traced Look, with View Dependence as the file has it or "
+        "where --preset is given; RING is the paper's (default: the file's; SPHERE for mesh "
+        "files)")  # fmt: skip
     add("--preset", choices=list(PRESETS), metavar="NAME",
         help=f"scatter distance of a real material: {', '.join(PRESETS)}")  # fmt: skip
     add("--albedo", type=_factor, nargs=3, metavar=("R", "G", "B"),

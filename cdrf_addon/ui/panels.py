@@ -21,7 +21,7 @@ from ..blender.world.surface import FIXED, SCALED
 from ..compat import EEVEE, HAS_RAYCAST
 from ..core.curvature.estimators import METHODS
 from ..core.curvature.summary import CONSTANT, FLAT, VARYING
-from ..core.reflectance.model import MODEL_ITEMS, PROFILE
+from ..core.reflectance.model import MODEL_ITEMS, PROFILE, SPHERE
 
 _MOST_LINES = 6
 
@@ -75,13 +75,16 @@ def draw_model(layout: bpy.types.UILayout, material: bpy.types.Material) -> None
     """Draw the choice of model, and the buttons that find a scatter distance."""
     kind = kind_of_model(material)
     name = next(label for key, label, *_ in MODEL_ITEMS if key == kind)
+    column = layout.column(align=True)
+    column.menu("CDRF_MT_model", text=name, icon="SHADING_TEXTURE")
+    if kind == SPHERE:
+        row = column.row(align=True)
+        row.enabled = material.is_editable
+        row.prop(material.cdrf, "view_dependence", toggle=True, icon="HIDE_OFF")
     row = layout.row(align=True)
-    row.operator_menu_enum("cdrf.set_model", "model", text=name, icon="SHADING_TEXTURE")
     row.operator_menu_enum("cdrf.preset", "preset", text="Preset", icon="PRESET")
-    row.operator("cdrf.read_shader", text="", icon="EYEDROPPER")
-    row = layout.row(align=True)
-    row.operator("cdrf.measure", icon="RENDER_STILL")
     row.operator("cdrf.fit", icon="GRAPH")
+    row.operator("cdrf.read_shader", text="", icon="EYEDROPPER")
     if kind == PROFILE:
         column = layout.column()
         column.prop(material.cdrf, "profile", text="")

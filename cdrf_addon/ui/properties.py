@@ -172,8 +172,9 @@ class CdrfMaterial(bpy.types.PropertyGroup):
     view_dependence: BoolProperty(
         name="View Dependence",
         description=(
-            "Bring light out of the surface as the path tracer's random walk does: more at the rim "
-            "and where the surface bulges, less in hollows. For Path-Traced Look only"
+            "Brighter at the rim and where the surface bulges, darker in hollows, as Cycles shows "
+            "it. Off, the surface looks the same from every side. A Principled BSDF with "
+            "Christensen-Burley starts without it; on, it looks as with Random Walk"
         ),
         get=_get_view,
         set=_set_view,

@@ -115,6 +115,19 @@ def test_the_fit_is_right_at_the_middle_curvature(material: bpy.types.Material) 
     assert picture.packed_file is not None and min(picture.size) > 500
 
 
+def test_the_fit_leaves_the_walks_mean_free_path(material: bpy.types.Material) -> None:
+    assert material.cdrf.view_dependence
+    node = cdrf_node(bpy.context.object)
+
+    def lengths() -> np.ndarray:
+        return own_sigma0(material) * np.array(node.inputs[ids.FREE_PATH].default_value)
+
+    before, fitted = lengths(), own_sigma0(material)
+    assert bpy.ops.cdrf.fit() == {"FINISHED"}
+    assert np.abs(own_sigma0(material) - fitted).max() > 0.01 * fitted.max()
+    assert lengths() == pytest.approx(before, rel=1e-5)
+
+
 def test_the_measured_table_stays_in_the_file_while_another_model_is_used(
     material: bpy.types.Material, tmp_path: Path
 ) -> None:
@@ -133,7 +146,7 @@ def test_a_deleted_measured_table_is_said(material: bpy.types.Material) -> None:
     assert table is not None
     bpy.data.images.remove(table.image)
     key, sentence = ensure_chosen(material)
-    assert key == SPHERE and "Measure again" in sentence
+    assert key == SPHERE and "measure it again" in sentence
     assert bpy.ops.cdrf.update() == {"FINISHED"}
     assert material.cdrf.model == SPHERE
 

@@ -112,7 +112,7 @@ def test_any_list_of_gaussians_is_taken_and_nonsense_changes_nothing(
 
 
 def test_measured_says_what_is_missing(egg: bpy.types.Object) -> None:
-    with pytest.raises(RuntimeError, match="press Measure first"):
+    with pytest.raises(RuntimeError, match=r"cdrf\.measure\(\) first"):
         bpy.ops.cdrf.set_model(model="MEASURED")
     assert egg.active_material.cdrf.model == SPHERE
 

@@ -46,7 +46,10 @@ def written_names(tree: ast.AST) -> Iterator[tuple[int, str]]:
 
 def test_nothing_in_blender_writes_a_property_that_has_a_setter() -> None:
     guarded = names_with_setter()
-    assert guarded == {"sigma0", "sigma0_ratio", "model", "gloss", "ambient_occlusion"}
+    assert guarded == {
+        *("sigma0", "sigma0_ratio", "model", "gloss", "ambient_occlusion"),
+        "view_dependence",
+    }
     found = [
         f"{path.relative_to(PACKAGE)}:{line} writes .{name}"
         for path in sorted((PACKAGE / "blender").rglob("*.py"))
@@ -80,8 +83,10 @@ def test_properties_and_functions_are_one_home(rig: Rig) -> None:
         for value in (True, False):
             settings.set_specular(material, value)
             settings.set_occluded(material, value)
+            settings.set_view_dependent(material, value)
             assert material.cdrf.gloss is value
             assert material.cdrf.ambient_occlusion is value
+            assert material.cdrf.view_dependence is value
         assert settings.is_sigma0_chosen(material)
 
 

@@ -239,3 +239,7 @@ def test_the_walk_of_a_material_is_read_from_its_node(rig: Rig) -> None:
     key = translucent(obj, material).node_tree[ids.WALK_KEY]
     method = compat.walk_method("RANDOM_WALK")
     assert key == MaterialWalk(method, 0.25, 1.33, 0.0).key
+    scattering = scattering_material((0.1, 0.1, 0.1))
+    scattering.node_tree.nodes["Subsurface Scattering"].inputs["Roughness"].default_value = 0.5
+    key = translucent(obj, scattering).node_tree[ids.WALK_KEY]
+    assert key == MaterialWalk(method, 0.5, 1.4, 0.0).key

@@ -20,7 +20,7 @@ from ..shader.variant import stamped_variant
 from . import settings
 from .install import cdrf_node, require_editable
 from .shader_group import change_variant, remove_unused
-from .walk import walk_for
+from .walk import choose_view, walk_for
 
 
 def model_key(material: bpy.types.Material) -> str:
@@ -59,8 +59,15 @@ def profile_problem(material: bpy.types.Material) -> str:
     return ""
 
 
-def set_kind(material: bpy.types.Material, kind: str) -> None:
+def set_kind(
+    material: bpy.types.Material, kind: str, *, view_dependent: bool | None = None
+) -> None:
     """Give a material another kind of model.
+
+    Args:
+        material: Any.
+        kind: RING, SPHERE, PROFILE or MEASURED.
+        view_dependent: Whether it depends on the view with the sphere model; None as now.
 
     Raises:
         ParameterError: The profile is not a list of Gaussians.
@@ -68,12 +75,15 @@ def set_kind(material: bpy.types.Material, kind: str) -> None:
     """
     require_editable(material)
     model = model_of_kind(material, kind)
+    if view_dependent is not None:
+        choose_view(material, view_dependent)
     if model is not None:
         set_model(material, ensure_table(model).key)
         return
     if find_table(material.cdrf.measured) is None:
         raise SceneError(
-            f"'{material.name}' has not been measured in this file: press Measure first."
+            f"'{material.name}' has not been measured in this file: choose Path-Traced Look, or "
+            "measure it with bpy.ops.cdrf.measure() first."
         )
     set_model(material, material.cdrf.measured)
 
@@ -126,7 +136,10 @@ def ensure_chosen(material: bpy.types.Material) -> tuple[str, str]:
     key = ensure_table(sphere()).key
     material.cdrf.chosen_model = key
     what = "measured table" if kind == MEASURED else "profile's table"
+    remedy = "measure it again with bpy.ops.cdrf.measure()"
+    if kind == PROFILE:
+        remedy = "mend the profile and choose it again"
     return key, (
-        f"The {what} of '{material.name}' was deleted; it is shaded by the sphere model now: "
-        f"{'press Measure again' if kind == MEASURED else 'mend the profile and choose it again'}."
+        f"The {what} of '{material.name}' was deleted, so it has the Path-Traced Look now: "
+        f"{remedy} to have it back."
     )

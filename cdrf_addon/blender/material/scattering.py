@@ -41,6 +41,12 @@ class Scattering:
     """How light walks under the surface."""
     notes: tuple[str, ...] = ()
     """What could not be read as it is; a sentence each, for the artist."""
+    walk_notes: tuple[str, ...] = ()
+    """The same of what only the walk depends on."""
+
+    def notes_for(self, view_dependent: bool) -> tuple[str, ...]:
+        """Return what an artist should know whose surface depends on the view, or does not."""
+        return self.notes + (self.walk_notes if view_dependent else ())
 
 
 def read_scattering(material: bpy.types.Material) -> Scattering | None:
@@ -120,8 +126,9 @@ def _of_node(node: bpy.types.ShaderNode) -> Scattering | None:
             "did, so lower the scatter distance if that is too much."
         )
     radius = (lengths[0], lengths[1], lengths[2])
-    walk = _walk(node, walk_method(method), names[3], notes)
-    return Scattering(albedo, radius, method, weight, walk, tuple(notes))
+    unread: list[str] = []
+    walk = _walk(node, walk_method(method), names[3], unread)
+    return Scattering(albedo, radius, method, weight, walk, tuple(notes), tuple(unread))
 
 
 def _walk(
@@ -133,9 +140,12 @@ def _walk(
         known = name in node.inputs and node.inputs[name].enabled
         return _number(node, name, notes) if known else usual
 
-    roughness = number("Roughness", 1.0)
+    # The skin variant enters as through a rough surface, whatever the node's roughness.
+    roughness = 1.0 if method == SKIN else number("Roughness", 1.0)
+    # Cycles takes the square of the Principled BSDF's roughness, and the other node's as it is.
+    alpha = roughness**2 if node.type == "BSDF_PRINCIPLED" else roughness
     index = "Subsurface IOR" if method == SKIN else "IOR"
-    return MaterialWalk(method, roughness**2, number(index, 1.4), number(anisotropy, 0.0))
+    return MaterialWalk(method, alpha, number(index, 1.4), number(anisotropy, 0.0))
 
 
 def _number(node: bpy.types.ShaderNode, name: str, notes: list[str]) -> float:

@@ -17,9 +17,9 @@ import bpy
 from ... import ids
 from ..shader.variant import stamped_variant
 from . import specular
-from .install import cdrf_node
+from .install import cdrf_node, require_editable
 from .shader_group import change_variant
-from .walk import OFF, ON, walk_for
+from .walk import ON, choose_view, walk_for, write_free_path
 
 SIGMA0_MAX = 1e6
 RATIO_MAX = 1e3
@@ -80,11 +80,12 @@ def store_sigma0_ratio(material: bpy.types.Material, ratio: Sequence[float]) -> 
 
 
 def write_to_node(material: bpy.types.Material) -> None:
-    """Give a node that was just made the scatter distance that was chosen before."""
+    """Give a node that was just made the distances that were chosen before."""
     node = cdrf_node(material)
     assert node is not None
     node.inputs[ids.SIGMA0_RATIO].default_value = material.cdrf.chosen_ratio
     node.inputs[ids.SIGMA0].default_value = max(material.cdrf.chosen_sigma0, 0.0)
+    write_free_path(material)
 
 
 def is_occluded(material: bpy.types.Material) -> bool:
@@ -115,9 +116,10 @@ def set_view_dependent(material: bpy.types.Material, value: bool) -> None:
     """Switch the dependence on the view.
 
     Raises:
-        SceneError: The material's table was deleted.
+        SceneError: The material is linked, or its table was deleted.
     """
-    material.cdrf.chosen_view = ON if value else OFF
+    require_editable(material)
+    choose_view(material, value)
     node = cdrf_node(material)
     if node is not None:
         model = stamped_variant(node.node_tree).model

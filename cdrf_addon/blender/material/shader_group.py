@@ -8,13 +8,15 @@ from dataclasses import replace
 import bpy
 
 from ... import ids
+from ...core.curvature.summary import CONSTANT
 from ..shader.group import ensure_shader_group
 from ..shader.variant import ShadowChoice, Variant, is_shader_group, stamped_variant, variant_of
 from ..world.stamps import stamped_world
 from . import linking
 from .install import cdrf_node, install
 from .shadow_choice import choose_shadows
-from .walk import write_free_path
+from .translucent import materials_on
+from .walk import keep_free_path, write_free_path, write_mean_curvature
 
 
 def change_variant(
@@ -83,9 +85,20 @@ def _install(
     wanted = replace(wanted, links=linking.links_of(lights))
     # The world's light as it was at the last Update: a slider must not render anything.
     light = stamped_world(group)
+    keep_free_path(material)
     install(material, ensure_shader_group(wanted, scene, lights, light))
     write_free_path(material)
+    write_mean_curvature(material, _meshes(material))
     linking.write_unlit()
+
+
+def _meshes(material: bpy.types.Material) -> set[bpy.types.Mesh]:
+    """Return the meshes that show a material and have one curvature everywhere."""
+    return {
+        obj.data
+        for obj in bpy.data.objects
+        if obj.type == "MESH" and obj.data.cdrf.kind == CONSTANT and material in materials_on(obj)
+    }
 
 
 def _scene(group: bpy.types.ShaderNodeTree) -> bpy.types.Scene | None:

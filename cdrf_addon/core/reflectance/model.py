@@ -29,27 +29,31 @@ DEFAULT_KIND = SPHERE
 MODEL_ITEMS = (
     (
         SPHERE,
-        "Sphere",
-        "Light spreads as heat does on a sphere, and none is lost. Closest to path tracing on "
-        "heads and figures; the default",
+        "Path-Traced Look",
+        "As Cycles shows skin, wax and marble: softer where the surface bends, brighter at its "
+        "rim. View Dependence below takes the rim out again; the default",
     ),
     (
         RING,
-        "Ring (Kubo 2011)",
-        "The paper's own: light spreads along a circle. Bleeds more; brighter at large distances",
+        "Paper (Kubo 2011)",
+        "As in the paper: light spreads along a circle. Bleeds more; brighter at large distances",
     ),
     (
         PROFILE,
         "Profile",
-        "A sum of Gaussians for each colour, as of layered skin. One look-up for all colours",
+        "A soft edge of several widths for each colour, as layered skin has. One look-up for all "
+        "colours",
     ),
     (
         MEASURED,
-        "Measured",
-        "What Cycles shows on spheres of this very material. Press Measure first",
+        "Measured (older)",
+        "A table that was path-traced for this material. Older files have it; Path-Traced Look "
+        "comes closer and needs no minute of Cycles",
     ),
 )
 """Kind, name and tooltip of each model."""
+OFFERED_KINDS = (SPHERE, RING, PROFILE)
+"""What the panel offers; scripts and older files may have the others."""
 
 
 @dataclass(frozen=True)

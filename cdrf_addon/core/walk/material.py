@@ -23,7 +23,7 @@ class MaterialWalk:
 
     method: str = RANDOM_WALK
     alpha: float = 1.0
-    """GGX alpha of the surface: the square of the node's roughness."""
+    """GGX alpha of the surface: the SSS node's Roughness, the square of the Principled BSDF's."""
     ior: float = 1.4
     anisotropy: float = 0.0
 

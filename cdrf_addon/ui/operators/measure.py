@@ -23,6 +23,8 @@ from ...blender.material.install import cdrf_node
 from ...blender.material.model import has_colour, kind_of_model, set_kind, set_model
 from ...blender.material.scatter_distance import channel_sigma0, set_channel_sigma0
 from ...blender.material.scattering import Scattering, read_scattering
+from ...blender.material.settings import is_view_dependent
+from ...blender.material.walk import rescale_free_path
 from ...blender.nodes.tables import ensure_table
 from ...compat import walk_method
 from ...core.curvature.summary import CONSTANT
@@ -282,10 +284,17 @@ class CDRF_OT_fit(_PathTraced):
         name = "ring" if kind_of_model(material) == RING else "sphere"
         # Exact at the object's median curvature; the picture shows that sphere.
         sigma0 = sigma0_at(fitted, name, self.radius, self._kappa)
+        view_dependent = is_view_dependent(material)
+        before = channel_sigma0(material)
         set_channel_sigma0(material, sigma0)
+        if view_dependent:
+            # The walk's own length is the node's, and not what was fitted.
+            rescale_free_path(material, before, sigma0)
         warn_if_overridden(self, material)
         for sentence in fitted.sentences():
             self.report({"INFO"}, sentence)
+        if view_dependent:
+            self.report({"INFO"}, "CDRF: the fit shows most with View Dependence switched off")
         scale = max(self.radius) * self._kappa or MIDDLE_SCALE
         try:
             path = picture_path(material, cache_folder())

@@ -7,13 +7,14 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ... import ids
+from ...blender.material import settings
 from ...blender.material.install import cdrf_node
 from ...blender.material.model import has_colour, set_kind
 from ...blender.material.scatter_distance import apply_preset, set_scattering
 from ...blender.material.scattering import read_scattering
 from ...blender.units import length_text, metres_per_unit
 from ...core.errors import CdrfError
-from ...core.reflectance.model import DEFAULT_KIND, MODEL_ITEMS
+from ...core.reflectance.model import DEFAULT_KIND, MODEL_ITEMS, OFFERED_KINDS, SPHERE
 from ...core.scattering.presets import PRESETS
 from .shared import OnTranslucentMaterial, refuse, warn_if_overridden
 
@@ -34,11 +35,29 @@ class CDRF_OT_set_model(OnTranslucentMaterial):
         items=MODEL_ITEMS,
         default=DEFAULT_KIND,
     )
+    view_dependence: BoolProperty(
+        name="View Dependence",
+        description="Switch View Dependence on with Path-Traced Look; without this it stays as is",
+        default=False,
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
+    @classmethod
+    def description(
+        cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties
+    ) -> str:
+        return next(tip for kind, _, tip in MODEL_ITEMS if kind == properties.model)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        for kind in OFFERED_KINDS:
+            column.prop_enum(self, "model", kind)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         material = self.material(context)
+        switched_on = True if self.view_dependence and self.model == SPHERE else None
         try:
-            set_kind(material, self.model)
+            set_kind(material, self.model, view_dependent=switched_on)
         except CdrfError as error:
             return refuse(self, error)
         warn_if_overridden(self, material)
@@ -131,13 +150,25 @@ class CDRF_OT_read_shader(OnTranslucentMaterial):
         if has_colour(material):
             set_kind(material, DEFAULT_KIND)
         set_scattering(material, found)
-        for note in found.notes:
+        for note in found.notes_for(settings.is_view_dependent(material)):
             self.report({"WARNING"}, note)
         warn_if_overridden(self, material)
         self.report({"INFO"}, f"CDRF: scatter distance {material.cdrf.sigma0:.4g} from the nodes")
         return {"FINISHED"}
 
 
-CLASSES = (CDRF_OT_set_model, CDRF_OT_preset, CDRF_OT_read_shader)
+class CDRF_MT_model(bpy.types.Menu):
+    """The models that the panel offers"""
+
+    bl_label = "Model"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        for kind, name, _ in MODEL_ITEMS:
+            if kind in OFFERED_KINDS:
+                button = self.layout.operator("cdrf.set_model", text=name)
+                button.model, button.view_dependence = kind, True
+
+
+CLASSES = (CDRF_OT_set_model, CDRF_MT_model, CDRF_OT_preset, CDRF_OT_read_shader)
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)
