@@ -135,10 +135,9 @@ def _knee(results: dict[str, Any]) -> list[str]:
         "hollows do not show on spheres (33 in all).",
         "",
         *table(["terms", "numbers", *_ranges()], cells),
-        "Energy and a tilt take most of the error away; the haze takes a third of what is left.",
-        "The further numbers of tilt, haze and width carry the colour and, by the depth of entry,",
-        "other roughness and index, of which this table has only one. More would gain at ℓκ > 0.2",
-        "only, where one normal and one width stop standing for the exits at all.",
+        "Energy and a tilt take most of the error away, the haze a third of what is left. At this",
+        "one roughness and index a tilt of one number does as well as one of six: the others are",
+        "there for other colours, roughness and index. More numbers than these were not tried.",
         "",
     ]
 
