@@ -10,6 +10,7 @@ from importlib.util import find_spec
 BENCHMARKS = {
     "setup_time": ("2 minutes", "run time and memory of Make Translucent"),
     "lut": ("5 minutes", "the look-up table in rendered EEVEE pixels"),
+    "walk": ("5 minutes", "the view-dependent model against walks it was not fitted to"),
     "shadows": ("10 minutes", "cast shadows against path tracing"),
     "measured": ("15 minutes", "the measured model, and fits of sigma0 to spheres"),
     "resolution": ("15 minutes", "the same shape at several resolutions"),

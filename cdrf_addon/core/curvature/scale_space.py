@@ -30,7 +30,8 @@ LEVEL_RATIO = 4.0
 # Diffusion length over sigma0, measured against path tracing (docs/results/kappa_choice.md).
 LENGTH_PER_SIGMA0 = 2.0
 # Length of the mean curvature that decides the energy over that of kappa: what is absorbed on the
-# way out is gathered from further away than what blurs (decision 017).
+# way out is gathered from further away than what blurs
+# (docs/develop/decisions/017-view-dependence.md).
 MEAN_LENGTH = 2.0
 # Level at which the shape operator is kept: shorter ones hold the noise of the mesh.
 SHAPE_LEVEL = 1

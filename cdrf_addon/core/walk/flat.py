@@ -121,7 +121,7 @@ def flat_fit(
     anisotropy: float = 0.0,
     bounces: float = BOUNCES,
 ) -> FlatFit:
-    """Fit the flat limit of a method, in float64, by least squares; 0.2 s, then remembered.
+    """Fit the flat limit of a method, in float64, by least squares; half a second, once.
 
     The bound: over mu in [0.02, 1] and every colour, roughness and index, A G differs from the
     exact by less than 0.011, root mean square below 0.0026 (tests/core/test_walk_flat.py; 0.005 and

@@ -17,8 +17,10 @@ Per channel, A the colour, l the mean free path, H the mean curvature and kappa 
   1/4 as that of f, and it costs no second look-up.
 
 All coefficients are fits to walks of spheres, 0.01 <= l kappa <= 0.5, three pairs of roughness and
-index at once (tests/benchmarks/walk_tables.py makes such fits and judges them). RMS over A of a
+index at once (`./dev bench walk` makes such fits, and judges these). RMS over A of a
 ball's picture under all suns: 0.006 to l kappa = 0.1, 0.015 at 0.2, 0.033 at 0.3, for A >= 0.34.
+Those here come from 100,000 to 200,000 walks a view of a compiled copy of core/walk/sphere_walk.py;
+fewer walks in NumPy give other digits at similar errors.
 Skin and legacy walks miss no more. An anisotropic medium is taken for the isotropic one of its
 moments: at g = 0.8 the spread of G over the views is 1.1 (A = 0.8) to 1.65 times (A = 0.34) what
 that says. What roughness and index do is in the mean depth of the entry and its length along the
