@@ -192,14 +192,14 @@ def _look_rows(results: Results) -> list[str]:
             for name in (LOOK, DEFAULT) if "rmse" in cell["contenders"].get(name, {})]  # fmt: skip
     if not rows:
         return [
-            f"**The path-traced look**, which a scattering material gets by default, is not in "
+            "**The path-traced look**, which a scattering material gets by default, is not in "
             "the tables of this part: all of their rows are older. It was measured in a study of "
             f"its own, [{STUDY}.md]({STUDY}.md), with fewer pixels.",
             "",
         ]
     dates = sorted({row["date"] for _, row in rows})
     return [
-        f"**The path-traced look**, which a scattering material gets by default, was measured on "
+        "**The path-traced look**, which a scattering material gets by default, was measured on "
         f"{', '.join(dates)}, in {len(rows)} rows; rows of others may be older.",
         "",
     ]

@@ -55,7 +55,12 @@ def page(results: Row) -> str:
             "",
             f"![Reference, EEVEE Principled, sphere, path-traced look](images/{NAME}.png)",
             "",
-            "Random Walk; under each row eight times the absolute difference.",
+            "Random Walk; under each row eight times the absolute difference. On the head what is "
+            "left sits beside cast shadows and at thin edges: the far eye and cheek, lips and lids "
+            "are too bright and too red. On the bust the walk goes through the face and levels it; "
+            "the look, which knows the surface alone, keeps sockets and nose too sharp. On the "
+            "torus the inner side that faces the light is too bright. No patches, bands or seams "
+            "are seen; at the outline single pixels differ either way.",
             "",
         ]
     return "\n".join(lines).rstrip() + "\n"
