@@ -16,6 +16,7 @@ from stability import EXTREMES
 from cdrf_addon.core.reflectance.profile import SKIN_PROFILE
 from cdrf_addon.core.scattering.node_radius import BURLEY, RANDOM_WALK, sigma0_per_radius
 from tests.benchmarks.report import metrics, stability, texture_blurring
+from tests.benchmarks.report.contenders import DEFAULT, LAMBERT
 from tests.benchmarks.report.matrix import keep_pictures, load_pictures
 from tests.benchmarks.report.settings import quick
 from tests.benchmarks.report.substances import PRESET_OF, profile_of, substance
@@ -136,7 +137,7 @@ def test_every_method_gets_the_radius_of_one_sigma0(method: str) -> None:
 
 def study_row(look: float) -> dict[str, Any]:
     """A scene in which every other contender is 0.04 off."""
-    errors = dict.fromkeys(study.COMPARED, 0.04) | {study.DEFAULT: look}
+    errors = dict.fromkeys(study.COMPARED, 0.04) | {DEFAULT: look}
     shares = dict.fromkeys(page.PARTS, (1.0 / 3.0, 1.0 / 3.0))
     return {
         "contenders": {
@@ -160,8 +161,8 @@ def test_the_study_means_geometrically_and_names_what_is_worse() -> None:
     }
     found = study.measured(results, RANDOM_WALK)
     assert [cell.name for cell in found] == list(cells)
-    assert study.share(found.values(), study.DEFAULT, study.LAMBERT, "all") == pytest.approx(1.0)
-    assert study.unscaled(found.values(), study.DEFAULT) == pytest.approx(0.5)
+    assert study.share(found.values(), DEFAULT, LAMBERT, "all") == pytest.approx(1.0)
+    assert study.unscaled(found.values(), DEFAULT) == pytest.approx(0.5)
     text = page.page(results)
     assert "Scenes in which it is farther off than Lambert: torus, milk, sun (4.00)." in text
     assert "34 not measured yet" in text

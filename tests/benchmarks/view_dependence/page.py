@@ -141,15 +141,17 @@ def _worse(cells: Mapping[Cell, Row]) -> list[str]:
 def _goals(cells: Mapping[Cell, Row]) -> list[str]:
     """What was asked for, and whether it holds."""
     every = list(cells.values())
-    simple = [row for one, row in cells.items() if one.shape in SIMPLE]
     worse = sum(error(row, DEFAULT, "all") > error(row, LAMBERT, "all") for row in every)
-    rows = []
-    for words, goal, found in (
+    asked = [
         ("mean over Lambert's", GOAL, share(every, DEFAULT, LAMBERT, "all")),
         ("mean over EEVEE Principled's", GOAL, share(every, DEFAULT, PRINCIPLED, "all")),
-        (f"{' and '.join(SIMPLE)}, over Lambert's", SIMPLE_GOAL,
-         share(simple, DEFAULT, LAMBERT, "all")),
-    ):  # fmt: skip
+    ]
+    for shape in SIMPLE:
+        some = [row for one, row in cells.items() if one.shape == shape]
+        found = share(some, DEFAULT, LAMBERT, "all")
+        asked.append((f"{shape}, over Lambert's", SIMPLE_GOAL, found))
+    rows = []
+    for words, goal, found in asked:
         rows.append([words, f"≤ {goal:g}", f"{found:.3f}", "yes" if found <= goal else "**no**"])
     rows.append(["scenes worse than Lambert", "0", str(worse), "**no**" if worse else "yes"])
     return table(["RMSE over all pixels", "goal", "found", "held"], rows)
