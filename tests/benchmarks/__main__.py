@@ -15,6 +15,7 @@ BENCHMARKS = {
     "measured": ("15 minutes", "the measured model, and fits of sigma0 to spheres"),
     "resolution": ("15 minutes", "the same shape at several resolutions"),
     "node_groups": ("half an hour", "nodes and cost of a draw, by lights and shadows"),
+    "view_dependence": ("an hour", "the path-traced look against two of Cycles' methods"),
     "model_choice": ("half an hour", "which model comes closest to path tracing"),
     "kappa_choice": ("an hour", "which curvature, diffused over which length"),
     "estimators": ("7 hours", "error against time of curvature estimators (--quick: minutes)"),

@@ -7,18 +7,21 @@ import ast
 import itertools
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from stability import EXTREMES
 
 from cdrf_addon.core.reflectance.profile import SKIN_PROFILE
-from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
+from cdrf_addon.core.scattering.node_radius import BURLEY, RANDOM_WALK, sigma0_per_radius
 from tests.benchmarks.report import metrics, stability, texture_blurring
+from tests.benchmarks.report.contenders import DEFAULT, LAMBERT
 from tests.benchmarks.report.matrix import keep_pictures, load_pictures
 from tests.benchmarks.report.settings import quick
 from tests.benchmarks.report.substances import PRESET_OF, profile_of, substance
 from tests.benchmarks.report.timing import split
+from tests.benchmarks.view_dependence import page, study
 
 TESTS = Path(__file__).resolve().parents[1]
 # Unit square in the plane z = 0, two triangles; texture coordinates are positions.
@@ -123,6 +126,51 @@ def test_the_path_tracer_and_the_slider_get_the_same_number() -> None:
     marble = substance("marble")
     back = marble.radius(25.0) * sigma0_per_radius(marble.albedo)
     assert back == pytest.approx(np.array(marble.preset.sigma0) / 25.0)
+
+
+@pytest.mark.parametrize("method", [RANDOM_WALK, BURLEY])
+def test_every_method_gets_the_radius_of_one_sigma0(method: str) -> None:
+    skin = substance("skin")
+    back = skin.radius(25.0, method) * sigma0_per_radius(skin.albedo, method)
+    assert back == pytest.approx(np.array(skin.preset.sigma0) / 25.0)
+
+
+def study_row(look: float) -> dict[str, Any]:
+    """A scene in which every other contender is 0.04 off."""
+    errors = dict.fromkeys(study.COMPARED, 0.04) | {DEFAULT: look}
+    shares = dict.fromkeys(page.PARTS, (1.0 / 3.0, 1.0 / 3.0))
+    return {
+        "contenders": {
+            name: {
+                "rmse": dict.fromkeys(study.MASKS, off),
+                "gain": {"rmse": off / 2.0},
+                "shares": shares,
+            }
+            for name, off in errors.items()
+        },
+        "floor": dict.fromkeys(study.MASKS, 0.001),
+        "apart": dict.fromkeys(study.MASKS, 0.03),
+    }
+
+
+def test_the_study_means_geometrically_and_names_what_is_worse() -> None:
+    cells = {"sphere, skin, sun": study_row(0.01), "torus, milk, sun": study_row(0.16)}
+    results = {
+        "machine": {"date": "2026-11-28"},
+        "references": {RANDOM_WALK: cells, BURLEY: {"sphere, skin, sun": study_row(0.08)}},
+    }
+    found = study.measured(results, RANDOM_WALK)
+    assert [cell.name for cell in found] == list(cells)
+    assert study.share(found.values(), DEFAULT, LAMBERT, "all") == pytest.approx(1.0)
+    assert study.unscaled(found.values(), DEFAULT) == pytest.approx(0.5)
+    text = page.page(results)
+    assert "Scenes in which it is farther off than Lambert: torus, milk, sun (4.00)." in text
+    assert "34 not measured yet" in text
+    assert "| scenes worse than Lambert | 0 | 1 | **no** |" in text
+    assert "the error of the look is 2.00" in text
+    (sentence,) = page.default_sentences(results, alone=True)
+    assert "than Lambert in 1 of 2 scenes with lamps" in sentence
+    assert page.default_sentences({}, alone=True) == []
 
 
 def test_similarity_of_known_pictures() -> None:

@@ -101,6 +101,7 @@ def cdrf(
     stage: Stage,
     model: str = "SPHERE",
     *,
+    view: bool = False,
     shadows: bool = False,
     edges: bool = False,
     raw: bool = False,
@@ -111,6 +112,7 @@ def cdrf(
     Args:
         stage: In any state.
         model: RING, SPHERE, PROFILE or MEASURED.
+        view: View Dependence, which a material that is read from its node has by default.
         shadows: Cast shadows.
         edges: Coloured ones.
         raw: Curvature as it is measured at each vertex, not at the length light diffuses over.
@@ -132,6 +134,8 @@ def cdrf(
         assert bpy.ops.cdrf.measure(quality=stage.settings.quality) == {"FINISHED"}
     else:
         assert bpy.ops.cdrf.set_model(model=model) == {"FINISHED"}
+    settings.view_dependence = view
+    assert settings.view_dependence == view
     bpy.context.view_layer.update()
     with (
         nullcontext() if shadows else stage.without_shadows(),
@@ -256,8 +260,11 @@ def _unwrapped(stage: Stage) -> str:
 
 LAMBERT = "Lambert (Diffuse BSDF)"
 PAPER = "CDRF ring, raw curvature (the paper)"
-DEFAULT = "CDRF sphere (the default)"
+SPHERE = "CDRF sphere"
 SHADOWS = "CDRF sphere, shadows"
+LOOK = "CDRF path-traced look"
+DEFAULT = "CDRF path-traced look, shadows"
+"""What Make Translucent gives a scattering material."""
 NODE = "EEVEE Subsurface Scattering"
 PRINCIPLED = "EEVEE Principled, subsurface"
 TEXTURE = "Texture blurring"
@@ -270,10 +277,13 @@ CONTENDERS = [
     Contender("CDRF ring", "CDRF ring", EEVEE, partial(cdrf, model="RING")),
     Contender("CDRF sphere, raw curvature", "CDRF sphere", EEVEE, partial(cdrf, raw=True),
               missing=_varying),
-    Contender(DEFAULT, "CDRF sphere", EEVEE, cdrf),
+    Contender(SPHERE, "CDRF sphere", EEVEE, cdrf),
     Contender("CDRF profile", "CDRF profile", EEVEE, partial(cdrf, model="PROFILE")),
     Contender("CDRF measured", "CDRF measured", EEVEE, partial(cdrf, model="MEASURED")),
     Contender(SHADOWS, "CDRF sphere", EEVEE, partial(cdrf, shadows=True), missing=_no_lamps),
+    Contender(LOOK, "CDRF path-traced look", EEVEE, partial(cdrf, view=True)),
+    Contender(DEFAULT, "CDRF path-traced look", EEVEE, partial(cdrf, view=True, shadows=True),
+              missing=_no_lamps),
     Contender("CDRF measured, shadows", "CDRF measured", EEVEE,
               partial(cdrf, model="MEASURED", shadows=True), missing=_no_lamps),
     Contender("CDRF sphere, coloured shadow edges", "CDRF sphere", EEVEE,
@@ -287,7 +297,7 @@ CONTENDERS = [
     Contender(f"{PATHS}, denoised", "Cycles", CYCLES, partial(_cycles, denoise=True), (1, 16)),
 ]  # fmt: skip
 
-QUICK = {LAMBERT, DEFAULT, TEXTURE, PATHS}
+QUICK = {LAMBERT, SPHERE, DEFAULT, TEXTURE, PATHS}
 """Those of the sample."""
 QUICK_SAMPLES = {PATHS: (1, 8)}
 

@@ -18,9 +18,9 @@ from ..common.memory import peak_megabytes, reset_peak
 from .cells import CELLS, FIRST, Cell
 from .contenders import (
     CONTENDERS,
-    DEFAULT,
     LAMBERT,
     PRINCIPLED,
+    SPHERE,
     Contender,
     chosen,
     row_name,
@@ -159,6 +159,7 @@ def run(
             start = time.perf_counter()
             picture = render(count)
             row = {
+                "date": time.strftime("%Y-%m-%d"),
                 "samples": count,
                 "seconds": time.perf_counter() - start,
                 "preparation": preparation,
@@ -212,7 +213,7 @@ def sun_taken_out(settings: Settings) -> None:
     found: dict[str, list[float]] = {}
     for threshold in (0.0, type(world).bl_rna.properties["sun_threshold"].default):
         world.sun_threshold = threshold
-        for contender in (one for one in CONTENDERS if one.name in (LAMBERT, PRINCIPLED, DEFAULT)):
+        for contender in (one for one in CONTENDERS if one.name in (LAMBERT, PRINCIPLED, SPHERE)):
             rows = run(stage, contender, (settings.film,), truth.picture, masks)
             found.setdefault(contender.name, []).append(rows[settings.film][0]["rmse"]["all"])
     results = settings.read("errors")

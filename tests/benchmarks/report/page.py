@@ -7,12 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..common.markdown import facts, generated
+from ..view_dependence.page import default_sentences
+from ..view_dependence.study import read as read_study
+from .contenders import DEFAULT
 from .page_errors import error_part, scenes_page
 from .page_paper import claim_sentences, paper_part
 from .page_times import timing_part
 from .results import Results
 from .settings import Settings
-from .standings import matrix_sentences
+from .standings import matrix_sentences, row_of
 
 
 def head(results: Results) -> list[str]:
@@ -37,7 +40,12 @@ def head(results: Results) -> list[str]:
 
 def conclusions(results: Results) -> list[str]:
     """A plain sentence for each section."""
-    found = [*claim_sentences(results), *matrix_sentences(results)]
+    looks = any(row_of(cell, DEFAULT) for cell in results.cells.values())
+    found = [
+        *claim_sentences(results),
+        *default_sentences(read_study(results.settings.data), alone=not looks),
+        *matrix_sentences(results),
+    ]
     if results.stability:
         cases = [case for test in results.stability["tests"] for case in test["cases"]]
         good = sum(case["outcome"] == "passed" for case in cases)

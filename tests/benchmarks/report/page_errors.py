@@ -4,20 +4,43 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
 from ..common.markdown import table
+from ..view_dependence.page import burley_part
+from ..view_dependence.study import NAME as STUDY
+from ..view_dependence.study import read as read_study
 from .cells import FIRST, Cell
-from .contenders import DEFAULT, LAMBERT, chosen, row_name
+from .contenders import (
+    DEFAULT,
+    LAMBERT,
+    LOOK,
+    SPHERE,
+    Contender,
+    chosen,
+    contender_of,
+    row_name,
+)
 from .figures import plots
 from .figures.scenes import file_of
 from .lights import SOFTBOXES
 from .matrix import contenders_of, wanted_cells
 from .results import DASH, Results
 from .shapes import FIGURINE, HEAD
-from .standings import MAIN, MEASURED, SHORT, Row, against, best_of, groups, of_eevee, row_of, share
+from .standings import (
+    MEASURED,
+    SHORT,
+    Row,
+    against,
+    best_of,
+    groups,
+    main_of,
+    of_eevee,
+    row_of,
+    share,
+)
 from .substances import PRESET_OF
 from .timing import frame_seconds
 
@@ -46,6 +69,8 @@ def error_part(results: Results) -> list[str]:
         *results.image("preparation.svg", "Error against time of preparation"),
         *_prepared(results),
     ]
+    study = read_study(results.settings.data)
+    lines += burley_part(study, "### A second reference: Christensen-Burley")
     lines += [*_shares(results), *_groups(results), *_overview(results), *_missing(results)]
     for cell, row in _detailed(results, first=True).items():
         lines += _cell_part(results, cell, row)
@@ -72,12 +97,12 @@ def _untimed(results: Results) -> str:
 
 def _prepared(results: Results) -> list[str]:
     """What measuring a material, the one long preparation, is worth."""
-    closer, alike, both = against(results.cells.values(), MEASURED, DEFAULT)
+    closer, alike, both = against(results.cells.values(), MEASURED, SPHERE)
     if not both:
         return []
     return [
         "Measuring the material, the one preparation that takes long, lowers the RMSE of the "
-        f"default model in {closer} and raises its SSIM in {alike} of {both} scenes.",
+        f"sphere model in {closer} and raises its SSIM in {alike} of {both} scenes.",
         "",
     ]
 
@@ -113,10 +138,11 @@ def _method(results: Results) -> list[str]:
         "the HDRI lights the scene; no light from "
         "surface to surface, which no contender but Cycles has. *Floor* is the Monte-Carlo "
         "error of the mean, half the RMSE between the two; what the denoiser does to both "
-        "alike is not in it. Cycles' walk enters half by cosine, half by refraction, so its "
-        "surfaces look different from different sides ([measured.md](measured.md)), which no other "
-        "contender does.",
+        "alike is not in it. Light that the camera sees has entered along the refracted view, so "
+        "a surface looks different from different sides, which of the others only the path-traced "
+        "look follows; every other CDRF here has View Dependence off.",
         "",
+        *_look_rows(results),
         "**Materials**: the presets' σ₀ in millimetres ("
         + ", ".join(f"{name}: {key}" for name, key in PRESET_OF.items())
         + f"). The head stands for one of {HEAD:g} mm, every other shape for a figurine of "
@@ -160,11 +186,30 @@ def _method(results: Results) -> list[str]:
     return lines
 
 
+def _look_rows(results: Results) -> list[str]:
+    """Say which rows are as old as the page, and which are of the look that came later."""
+    rows = [(name, cell["contenders"][name]) for cell in results.cells.values()
+            for name in (LOOK, DEFAULT) if "rmse" in cell["contenders"].get(name, {})]  # fmt: skip
+    if not rows:
+        return [
+            "**The path-traced look**, which a scattering material gets by default, is not in "
+            "the tables of this part: all of their rows are older. It was measured in a study of "
+            f"its own, [{STUDY}.md]({STUDY}.md), with fewer pixels.",
+            "",
+        ]
+    dates = sorted({row["date"] for _, row in rows})
+    return [
+        "**The path-traced look**, which a scattering material gets by default, was measured on "
+        f"{', '.join(dates)}, in {len(rows)} rows; rows of others may be older.",
+        "",
+    ]
+
+
 def _shares(results: Results) -> list[str]:
     """Each contender's error as a part of Lambert's, over the scenes that have both."""
     rows = []
     cells = list(results.cells.values())
-    for one, samples in chosen(sample=results.settings.sample):
+    for one, samples in _measured_anywhere(results, chosen(sample=results.settings.sample)):
         for count in samples or (results.settings.film,):
             key = row_name(one.name, samples, count)
             part, number = share(cells, key, "all")
@@ -185,9 +230,18 @@ def _shares(results: Results) -> list[str]:
     ]
 
 
+def _measured_anywhere(
+    results: Results, wanted: Iterable[tuple[Contender, tuple[int, ...]]]
+) -> Iterator[tuple[Contender, tuple[int, ...]]]:
+    """Leave out contenders without a row in any scene, such as those of after the last run."""
+    known = {name for cell in results.cells.values() for name in cell["contenders"]}
+    names = {one.name for one in map(contender_of, known) if one}
+    return (pair for pair in wanted if pair[0].name in names)
+
+
 def _groups(results: Results) -> list[str]:
     """The same means by lights, material and shape."""
-    lines, names = ["### Where who is closest", ""], (LAMBERT, *MAIN)
+    lines, names = ["### Where who is closest", ""], (LAMBERT, *main_of(results))
     for mask, words in MASKS.items():
         rows = []
         for by_name in groups(results).values():
@@ -219,7 +273,7 @@ def _overview(results: Results) -> list[str]:
     if others:
         lines += ["All contenders in each of them: below, and in "
                   "[report_scenes.md](report_scenes.md).", ""]  # fmt: skip
-    names = (LAMBERT, *MAIN)
+    names = (LAMBERT, *main_of(results))
     for mask, words in MASKS.items():
         rows = []
         for scene, cell in results.cells.items():
@@ -234,7 +288,7 @@ def _overview(results: Results) -> list[str]:
 def _cell_part(results: Results, cell: Cell, known: Row) -> list[str]:
     rows, contenders = [], known["contenders"]
     best = {mask: best_of(known, mask) for mask in ("all", "lit")}
-    for one, samples in contenders_of(results.settings, cell):
+    for one, samples in _measured_anywhere(results, contenders_of(results.settings, cell)):
         for count in samples or (results.settings.film,):
             key = row_name(one.name, samples, count)
             row = contenders.get(key)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from ..common.markdown import table
 from ..common.timing import spread
-from .contenders import DEFAULT
+from .contenders import SPHERE
 from .results import DASH, Results, with_spread
 from .timing import PARTS, base_of, power, split
 
@@ -125,7 +125,7 @@ def _preparation(results: Results) -> list[str]:
         return []
     rows = part["rows"]
     phrases = [
-        f"*Make Translucent* {with_spread([one['wall'] for one in rows[DEFAULT]['setup']])} s"
+        f"*Make Translucent* {with_spread([one['wall'] for one in rows[SPHERE]['setup']])} s"
     ]
     if "CDRF measured" in rows:
         measured = [one["wall"] for one in rows["CDRF measured"]["measure"]]

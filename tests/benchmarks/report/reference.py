@@ -13,6 +13,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from cdrf_addon.core.scattering.node_radius import RANDOM_WALK
+
 from ..common.arrays import Array, Mask
 from .cells import FIRST, Cell
 from .metrics import rmse
@@ -62,14 +64,25 @@ def paths(settings: Settings, cell: Cell) -> int:
     return settings.samples if settings.sample or cell in FIRST else settings.samples // 2
 
 
-def reference(stage: Stage, bounces: int = 0) -> Reference:
-    """Path-trace a stage in its scattering material, or take it from the cache."""
+def reference(
+    stage: Stage, bounces: int = 0, *, samples: int = 0, method: str = RANDOM_WALK
+) -> Reference:
+    """Path-trace a stage in its scattering material, or take it from the cache.
+
+    Args:
+        stage: Its scattering material is not translucent, and of this method.
+        bounces: Of light from surface to surface.
+        samples: Paths through a pixel of each picture; 0: as the report has them.
+        method: The subsurface method, for the name it is kept by.
+    """
     settings = stage.settings
-    samples = paths(settings, stage.cell)
+    samples = samples or paths(settings, stage.cell)
     stage.assign(stage.scattering)
     pictures, seconds = [], 0.0
     for seed in (SEED, SEED + 1):
         key = [asdict(stage.cell), stage.size, samples, settings.level, seed, bounces]
+        if method != RANDOM_WALK:
+            key.append(method)
 
         def render(seed: int = seed) -> Array:
             return stage.cycles(samples, seed, denoise=True, bounces=bounces)

@@ -65,6 +65,17 @@ class Stage:
         """Scatter distance of each channel, units."""
         return self.substance.sigma0(self.millimetres)
 
+    def use_method(self, method: str) -> None:
+        """Let both scattering materials take another subsurface method, at the same sigma0."""
+        radius = self.substance.radius(self.millimetres, method)
+        for material, node_type, setting, name in (
+            (self.scattering, "SUBSURFACE_SCATTERING", "falloff", "Radius"),
+            (self.principled, "BSDF_PRINCIPLED", "subsurface_method", "Subsurface Radius"),
+        ):
+            node = next(one for one in material.node_tree.nodes if one.type == node_type)
+            setattr(node, setting, method)
+            node.inputs[name].default_value = radius
+
     def _scattering(self) -> bpy.types.Material:
         material = bpy.data.materials.new("Subsurface")
         tree = ensure_node_tree(material)

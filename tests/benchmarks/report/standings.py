@@ -15,10 +15,12 @@ from .contenders import (
     DEFAULT,
     EEVEE,
     LAMBERT,
+    LOOK,
     PAPER,
     PATHS,
     PRINCIPLED,
     SHADOWS,
+    SPHERE,
     TEXTURE,
     Contender,
     contender_of,
@@ -32,23 +34,31 @@ Row = Mapping[str, Any]
 
 MEASURED, MEASURED_SHADOWS = "CDRF measured", "CDRF measured, shadows"
 DENOISED = f"{PATHS}, denoised, 16"
-MAIN = (PAPER, "CDRF ring", DEFAULT, SHADOWS, MEASURED, MEASURED_SHADOWS, PRINCIPLED, TEXTURE,
-        DENOISED)  # fmt: skip
+MAIN = (PAPER, "CDRF ring", SPHERE, SHADOWS, LOOK, DEFAULT, MEASURED, MEASURED_SHADOWS, PRINCIPLED,
+        TEXTURE, DENOISED)  # fmt: skip
 """A scene is summarised in one line by these, beside Lambert."""
-SAME_AS = {SHADOWS: DEFAULT, MEASURED_SHADOWS: MEASURED, PAPER: "CDRF ring"}
+SAME_AS = {SHADOWS: SPHERE, DEFAULT: LOOK, MEASURED_SHADOWS: MEASURED, PAPER: "CDRF ring"}
 """Where nothing casts a shadow, or curvature is the same everywhere, these are one picture."""
 SHORT = {
     LAMBERT: "Lambert",
     PAPER: "ring, raw (the paper)",
     "CDRF ring": "ring",
-    DEFAULT: "sphere",
+    SPHERE: "sphere",
     SHADOWS: "sphere, shadows",
+    LOOK: "path-traced look",
+    DEFAULT: "path-traced look, shadows",
     MEASURED: "measured",
     MEASURED_SHADOWS: "measured, shadows",
     PRINCIPLED: "EEVEE Principled",
     TEXTURE: "texture blurring",
     DENOISED: "Cycles 16, denoised",
 }
+
+
+def main_of(results: Results) -> tuple[str, ...]:
+    """Those of MAIN that were measured in any scene."""
+    return tuple(name for name in MAIN
+                 if any(row_of(cell, name) for cell in results.cells.values()))  # fmt: skip
 
 
 # --- who is closest ------------------------------------------------------------------------------
@@ -130,7 +140,7 @@ def matrix_sentences(results: Results) -> list[str]:
 def _pairs(cells: Sequence[Row]) -> list[str]:
     """How often a setting, chosen beforehand, is closer than Lambert and than EEVEE's own."""
     found = []
-    for name in (DEFAULT, SHADOWS, PAPER, TEXTURE):
+    for name in (DEFAULT, SPHERE, SHADOWS, PAPER, TEXTURE):
         phrases = []
         for other, words in ((LAMBERT, "Lambert"), (PRINCIPLED, "EEVEE's own scattering")):
             closer, alike, both = against(cells, name, other)
@@ -171,7 +181,8 @@ def _group_sentences(results: Results) -> list[str]:
         phrases = []
         for name, cells in by_name.items():
             # On equal terms the plainer one is named: Lambert first, raw curvature last.
-            names = (LAMBERT, *(one for one in MAIN if of_eevee(one) and one != PAPER), PAPER)
+            usual = (one for one in main_of(results) if of_eevee(one) and one != PAPER)
+            names = (LAMBERT, *usual, PAPER)
             means = {one: share(cells, one, "all")[0] for one in names}
             best = min(means, key=lambda one: means[one])
             if math.isfinite(means[best]):

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from cdrf_addon.core.reflectance.profile import Profile
-from cdrf_addon.core.scattering.node_radius import sigma0_per_radius
+from cdrf_addon.core.scattering.node_radius import RANDOM_WALK, sigma0_per_radius
 from cdrf_addon.core.scattering.presets import PRESETS, Colour, Preset
 
 from ..common.arrays import Array
@@ -42,9 +42,9 @@ class Substance:
         """Scatter distance of each channel in units of so many millimetres, (3,)."""
         return np.array(self.preset.sigma0) / millimetres
 
-    def radius(self, millimetres: float) -> Array:
-        """Subsurface radius of each channel in those units, (3,)."""
-        return np.asarray(self.sigma0(millimetres) / sigma0_per_radius(self.albedo))
+    def radius(self, millimetres: float, method: str = RANDOM_WALK) -> Array:
+        """Subsurface radius of each channel in those units, (3,), by the path tracer's method."""
+        return np.asarray(self.sigma0(millimetres) / sigma0_per_radius(self.albedo, method))
 
 
 def substance(name: str) -> Substance:

@@ -35,11 +35,13 @@ from .contenders import (
     DEFAULT,
     EEVEE,
     LAMBERT,
+    LOOK,
     NODE,
     NUMPY,
     PATHS,
     PRINCIPLED,
     SHADOWS,
+    SPHERE,
     TEXTURE,
     Contender,
 )
@@ -49,12 +51,12 @@ from .stage import Stage
 CELL = Cell("head", "skin", "sun")
 UNSHADOWED = "Lambert, no shadows"
 RAYS = "CDRF sphere, coloured shadow edges"
-TIMED = (LAMBERT, UNSHADOWED, "CDRF ring", DEFAULT, "CDRF profile", "CDRF measured", SHADOWS, RAYS,
-         NODE, PRINCIPLED, TEXTURE, PATHS)  # fmt: skip
-TIMED_QUICK = (UNSHADOWED, DEFAULT)
-WITH_SHADOWS = {LAMBERT, SHADOWS, RAYS, NODE, PRINCIPLED, PATHS, TEXTURE}
+TIMED = (LAMBERT, UNSHADOWED, "CDRF ring", SPHERE, LOOK, "CDRF profile", "CDRF measured", SHADOWS,
+         DEFAULT, RAYS, NODE, PRINCIPLED, TEXTURE, PATHS)  # fmt: skip
+TIMED_QUICK = (UNSHADOWED, SPHERE)
+WITH_SHADOWS = {LAMBERT, SHADOWS, DEFAULT, RAYS, NODE, PRINCIPLED, PATHS, TEXTURE}
 """These are compared with Lambert under shadows, the others with Lambert without."""
-SCALED = (UNSHADOWED, DEFAULT, NODE)
+SCALED = (UNSHADOWED, SPHERE, NODE)
 PIXELS = (128, 256, 512, 1024)
 LIGHTS = (1, 2, 4, 8)
 VERTICES = (2_000, 20_000, 200_000)
@@ -208,8 +210,8 @@ def preparation(settings: Settings, known: dict[str, Any]) -> Iterator[None]:
     stage = Stage(Cell("sphere", "skin", "sun") if settings.sample else CELL, settings)
     known["cell"], known["vertices"] = stage.cell.name, len(stage.obj.data.vertices)
     setup = timed(bpy.ops.cdrf.setup)
-    if _due(known, DEFAULT, "setup"):
-        _keep(known, DEFAULT, {"setup": setup})
+    if _due(known, SPHERE, "setup"):
+        _keep(known, SPHERE, {"setup": setup})
         yield
     if not settings.sample and _due(known, "CDRF measured", "measure"):
         # In a folder of its own: what was measured once is kept and costs nothing.

@@ -31,6 +31,7 @@ COLOURS = {
     "Lambert": "#8c8c94",
     "CDRF ring": "#d65f00",
     "CDRF sphere": "#008c5a",
+    "CDRF path-traced look": "#00a8b8",
     "CDRF profile": "#c8408c",
     "CDRF measured": "#0061c7",
     "EEVEE scattering": "#7a4fbf",

@@ -14,8 +14,8 @@ from matplotlib.axes import Axes
 from ...common.timing import spread
 from ..contenders import (
     CONTENDERS,
-    DEFAULT,
     EEVEE,
+    SPHERE,
     TEXTURE,
     contender_of,
 )
@@ -163,9 +163,9 @@ def preparation_seconds(settings: Settings) -> dict[str, float]:
     def middle(name: str, point: str) -> float:
         return spread([one["wall"] for one in rows.get(name, {}).get(point, [])] or [math.nan])[0]
 
-    if DEFAULT not in rows:
+    if SPHERE not in rows:
         return {}
-    setup = middle(DEFAULT, "setup")
+    setup = middle(SPHERE, "setup")
     found = {one.name: 0.0 for one in CONTENDERS if not one.name.startswith("CDRF")}
     found.pop(TEXTURE, None)
     for one in CONTENDERS:

@@ -13,6 +13,7 @@ from ..contenders import (
     PATHS,
     PRINCIPLED,
     SHADOWS,
+    SPHERE,
     TEXTURE,
 )
 from ..matrix import load_pictures, pictures_path, wanted_cells
@@ -22,8 +23,9 @@ from .drawing import brighter, figure, picture, plain
 DIFFERENCE = 8.0
 SHOWN = (
     LAMBERT,
-    DEFAULT,
+    SPHERE,
     SHADOWS,
+    DEFAULT,
     "CDRF measured",
     f"{NODE}, 16",
     PRINCIPLED,
@@ -57,7 +59,7 @@ def cell_pictures(settings: Settings) -> None:
                 values = pictures[name][..., :3].astype(np.float64)
                 title = name.replace("Subsurface Scattering", "scattering node")
                 title = title.replace("EEVEE ", "EEVEE\n").replace("CDRF ", "CDRF\n")
-                title = title.replace(" (the default)", "").replace(" (Diffuse BSDF)", "")
+                title = title.replace(" (Diffuse BSDF)", "")
                 picture(rows[0][column], values * factor, title.replace("Random Walk, ", "\n"))
                 off = np.abs(values - truth) * factor * DIFFERENCE
                 picture(rows[1][column], off, f"× {DIFFERENCE:g} difference")
