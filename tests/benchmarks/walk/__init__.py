@@ -6,5 +6,5 @@ docs/results/walk.md with its figure. The coefficients of core/walk/view.py were
 formulas and weights, to 100,000 to 200,000 walks a view of a compiled copy of the walk (numba). The
 command walks less, in NumPy, so that it comes to other digits at a similar error: the nine numbers
 of GAIN trade against each other. It does not reproduce the digits that ship; what anybody can check
-is their error: `--judge`.
+is their error: `--judge`. Nobody has run it for longer than minutes.
 """
