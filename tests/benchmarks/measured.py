@@ -297,7 +297,7 @@ def page(results: dict[str, Any]) -> str:
     lines += [
         "## Radiance depends on the direction from which it is seen",
         "",
-        "Cycles' walk enters the surface half by cosine, half by refraction through a rough "
+        "Cycles' Random Walk enters the surface along the view, refracted through a rough "
         "interface, so equal N·L does not look equal from everywhere. Ratio to the table's, for "
         "N·L > 0.3; elevation 89° is light from behind the camera.",
         "",
