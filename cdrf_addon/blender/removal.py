@@ -40,8 +40,9 @@ def remove_translucency(
         remove(material)
     _end_unused_display(context)
     for obj in users:
-        if not translucent_materials_on(obj) and obj.is_editable and obj.data.is_editable:
-            _forget_curvature(obj)
+        if not translucent_materials_on(obj):
+            _forget_object(obj)
+    _forget_meshes({obj.data for obj in users})
     linking.write_unlit()
     remove_unused()
 
@@ -55,9 +56,16 @@ def _end_unused_display(context: bpy.types.Context) -> None:
         viewport.restore(context)
 
 
-def _forget_curvature(obj: bpy.types.Object) -> None:
-    """Remove all that was measured of an object and its mesh."""
-    remove_curvature(obj.data)
-    obj.data.cdrf.fingerprint = ""
-    if ids.SCALE_KEY in obj:
+def _forget_object(obj: bpy.types.Object) -> None:
+    """Remove what an object says of its size."""
+    if obj.is_editable and ids.SCALE_KEY in obj:
         del obj[ids.SCALE_KEY]
+
+
+def _forget_meshes(meshes: set[bpy.types.Mesh]) -> None:
+    """Remove what was measured of meshes, of which no object is translucent any more."""
+    needed = {obj.data for obj in bpy.data.objects if translucent_materials_on(obj)}
+    for mesh in meshes - needed:
+        if mesh.is_editable:
+            remove_curvature(mesh)
+            mesh.cdrf.fingerprint = ""

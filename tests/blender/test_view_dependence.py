@@ -440,3 +440,37 @@ def test_the_batch_takes_the_models_and_leaves_the_switch(rig: Rig) -> None:
     assert not own.view_dependence
     batch_scene._set_model(obj.active_material, BatchOptions(preset="SKIN1"))
     assert own.view_dependence
+
+
+def test_groups_of_walks_that_nobody_uses_are_removed(rig: Rig) -> None:
+    material = node_material("SUBSURFACE_SCATTERING")
+    rig.sphere()
+    bpy.context.object.data.materials.append(material)
+    bpy.ops.cdrf.setup()
+    count = len(bpy.data.node_groups)
+    node = next(n for n in material.node_tree.nodes if n.type == "SUBSURFACE_SCATTERING")
+    for step in range(5):
+        node.inputs["Roughness"].default_value = 0.1 + 0.1 * step
+        assert bpy.ops.cdrf.read_shader() == {"FINISHED"}
+        assert bpy.ops.cdrf.update() == {"FINISHED"}
+    assert len(bpy.data.node_groups) == count
+    assert bpy.ops.cdrf.remove() == {"FINISHED"}
+    assert not [group for group in bpy.data.node_groups if "Walk" in group.name]
+
+
+def test_removing_one_user_of_a_mesh_leaves_the_other_its_curvature(rig: Rig) -> None:
+    bpy.ops.mesh.primitive_torus_add()
+    first = bpy.context.object
+    first.data.materials.append(node_material("SUBSURFACE_SCATTERING"))
+    second = first.copy()
+    rig.scene.collection.objects.link(second)
+    second.material_slots[0].link = "OBJECT"
+    second.material_slots[0].material = node_material("SUBSURFACE_SCATTERING")
+    second.select_set(True)
+    assert bpy.ops.cdrf.setup() == {"FINISHED"}
+    second.select_set(False)
+    assert bpy.ops.cdrf.remove() == {"FINISHED"}
+    assert ids.SHAPE_ATTRIBUTE in first.data.attributes
+    second.select_set(True)
+    assert bpy.ops.cdrf.remove() == {"FINISHED"}
+    assert ids.SHAPE_ATTRIBUTE not in first.data.attributes

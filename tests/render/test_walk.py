@@ -243,3 +243,20 @@ def test_the_walk_of_a_material_is_read_from_its_node(rig: Rig) -> None:
     scattering.node_tree.nodes["Subsurface Scattering"].inputs["Roughness"].default_value = 0.5
     key = translucent(obj, scattering).node_tree[ids.WALK_KEY]
     assert key == MaterialWalk(method, 0.5, 1.4, 0.0).key
+
+
+def test_colours_above_one_and_distances_below_zero(rig: Rig) -> None:
+    sun(rig)
+    obj = rig.sphere()
+    node = translucent(obj, scattering_material((0.1, 0.1, 0.1), (1.0, 1.0, 1.0)))
+    white = rig.render()[..., :3]
+    node.inputs[ids.BASE_COLOR].default_value = (5.0, 5.0, 5.0, 1.0)
+    assert rig.render()[..., :3] == pytest.approx(5.0 * white, abs=5e-3)
+    node.inputs[ids.BASE_COLOR].default_value = (0.5, 0.5, 0.5, 1.0)
+    opaque = []
+    for sigma0 in (0.0, -0.1):  # a linked value may be negative
+        value = node.id_data.nodes.new("ShaderNodeValue")
+        value.outputs[0].default_value = sigma0
+        node.id_data.links.new(value.outputs[0], node.inputs[ids.SIGMA0])
+        opaque.append(rig.render()[..., :3])
+    assert opaque[1].max() <= 0.51

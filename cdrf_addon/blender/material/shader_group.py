@@ -18,6 +18,9 @@ from .shadow_choice import choose_shadows
 from .translucent import materials_on
 from .walk import keep_free_path, write_free_path, write_mean_curvature
 
+# Roles of the groups that only shader groups use, and of which each material may have its own.
+_PARTS = (ids.ROLE_REFLECTANCE, ids.ROLE_WALK, ids.ROLE_HAZE)
+
 
 def change_variant(
     material: bpy.types.Material,
@@ -121,7 +124,7 @@ def remove_unused() -> None:
             groups.remove(group)
     for group in list(groups):
         role = str(group.get(ids.ROLE_KEY, ""))
-        if role.startswith(ids.ROLE_REFLECTANCE) and group.users == 0 and group.library is None:
+        if role.startswith(_PARTS) and group.users == 0 and group.library is None:
             groups.remove(group)
     for image in list(bpy.data.images):
         ours = image.get(ids.ROLE_KEY) == ids.ROLE_LUT and image.library is None

@@ -63,9 +63,13 @@ def add_walk(
     )
     ratio = b.vector("MULTIPLY", given[ids.SIGMA0_RATIO], given[ids.FREE_PATH])
     lengths = b.vector("SCALE", ratio, scale=given[ids.SIGMA0])
+    lengths = b.vector("MAXIMUM", lengths, (0.0, 0.0, 0.0))
     # An opaque surface, or channel, is Lambert's.
     scatters = b.vector("SIGN", lengths)
-    change = b.vector("SUBTRACT", node.outputs[ids.REFLECTED], given[ids.BASE_COLOR])
+    # The walk ends at a colour of 1; what is above it stays the factor that it is without a walk.
+    above = b.vector("MAXIMUM", given[ids.BASE_COLOR], (1.0, 1.0, 1.0))
+    walked = b.vector("MULTIPLY", node.outputs[ids.REFLECTED], above)
+    change = b.vector("SUBTRACT", walked, given[ids.BASE_COLOR])
     reflected = b.vector("MULTIPLY_ADD", change, scatters, given[ids.BASE_COLOR])
     if not curved:
         return Walk(reflected, (0.0, 0.0, 0.0), None, None)
